@@ -14,6 +14,7 @@ from typing import Any
 
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import (
+    NS,
     ArrayRecord,
     CorEstimate,
     CorStatus,
@@ -22,7 +23,6 @@ from nanorocks_ros.records import (
     SpeedEstimate,
 )
 from nanorocks_ros.records.result_words import flags_in_words, reason_of
-from nanorocks_ros.wire.array_layouts import NS
 from nanorocks_ros.wire.flat_records import flat_names, flat_value
 from nanorocks_ros.wire.products import CURVES
 

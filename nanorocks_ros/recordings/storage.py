@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.recordings.offered_qos import OfferedQos
 
-NS = 1_000_000_000
 # Recordings count signed 64-bit nanoseconds since 1970; any other time stamp is damaged.
 LAST_NS = 2**63 - 1
 

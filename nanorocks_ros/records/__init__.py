@@ -10,8 +10,10 @@ from nanorocks_ros.records.cluster_estimates import Autocorrelation as Autocorre
 from nanorocks_ros.records.cluster_estimates import BodyEstimate as BodyEstimate
 from nanorocks_ros.records.cluster_estimates import ClusterEstimate as ClusterEstimate
 from nanorocks_ros.records.cluster_estimates import Merge as Merge
+from nanorocks_ros.records.cluster_estimates import sizes_disagree as sizes_disagree
 from nanorocks_ros.records.contact_records import PairCollision as PairCollision
 from nanorocks_ros.records.contact_records import Rebound as Rebound
+from nanorocks_ros.records.frames import NS as NS
 from nanorocks_ros.records.frames import Frame as Frame
 from nanorocks_ros.records.frames import MotionMask as MotionMask
 from nanorocks_ros.records.frames import Notice as Notice

@@ -24,6 +24,26 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+# Standard errors of the tracks within which an interval of the autocorrelation must begin.
+_DISAGREEMENT = 2.0
+
+
+def sizes_disagree(autocorrelation: MeasuredInterval, tracks: Measured) -> bool:
+    """Whether autocorrelation and tracks say different weight-averaged sizes.
+
+    Parameters
+    ----------
+    autocorrelation : MeasuredInterval, [beads]
+    tracks : Measured, [beads]
+        Where they are not known, nothing disagrees.
+    """
+    reach = _DISAGREEMENT * tracks.error
+    return tracks.known and (
+        autocorrelation.lower > tracks.value + reach
+        or autocorrelation.upper < tracks.value - reach
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterEstimate:
     """Width of the autocorrelation of one tray image, and clusters by that and by tracks.
@@ -46,7 +66,7 @@ class ClusterEstimate:
     cluster_size : MeasuredInterval, [beads]
         Number of beads per body, averaged over the beads (weight-averaged): 1 when all are single.
         Between the limits the width is one standard deviation off or less; a size beyond the
-        calibration has limits, too.
+        calibration, or contradicted by the tracks, has limits, too.
     size_status : SizeStatus
     bodies : Measured
         Free bodies by tracks: single beads and clusters; unknown where beads are not tracked.

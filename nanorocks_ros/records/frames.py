@@ -15,6 +15,9 @@ from nanorocks_ros.records.quality_flags import NOTHING_WRONG, UNKNOWN, Quality,
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+NS = 1_000_000_000
+"""Nanoseconds in a second: stamps are whole nanoseconds, times and intervals are in seconds."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from nanorocks_ros.records.cluster_estimates import sizes_disagree
 from nanorocks_ros.records.quality_flags import (
     CorRelation,
     CorStatus,
@@ -27,8 +28,6 @@ LARGEST_FIT_ERROR = 0.5
 """Relative standard error above which an initial speed or a Haff time means nothing."""
 
 
-# Standard errors of the tracks within which an interval of the autocorrelation must begin.
-_DISAGREEMENT = 2.0
 # Part of the distance from the edge of a prior to the upper limit, in which the lower limit is
 # at the edge.
 _AT_EDGE = 0.04
@@ -140,17 +139,12 @@ def size_flag(autocorrelation: MeasuredInterval, tracks: Measured) -> FlagWords 
     tracks : Measured, [beads]
         Weight-averaged size of bodies.
     """
-    reach = _DISAGREEMENT * tracks.error
-    if not tracks.known or (
-        not autocorrelation.lower > tracks.value + reach
-        and not autocorrelation.upper < tracks.value - reach
-    ):
+    if not sizes_disagree(autocorrelation, tracks):
         return None
-    limits = f'[{autocorrelation.lower:.1f}, {autocorrelation.upper:.1f}]'
+    limits = f'{autocorrelation.lower:.1f} to {autocorrelation.upper:.1f}'
     return FlagWords(
         'cluster_size',
-        f'the autocorrelation says {autocorrelation.value:.1f} beads a cluster {limits}, the '
-        f'tracks {tracks.value:.1f}',
+        f'the autocorrelation says {limits} beads a cluster, the tracks {tracks.value:.1f}',
         'look at the end of the cycle with `nanorocks look BAG --at SECONDS -o steps.png`: if '
         'beads lie together, the tracks miss that they stick; if not, calibrate the '
         'autocorrelation for this camera with `nanorocks cluster-curve`',

@@ -13,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import (
+    NS,
     CorRelation,
     CorStatus,
     Quality,
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import ArrayRecord
 
-NS = 1_000_000_000
 
 _ENUMERATIONS = {
     'method': SpeedMethod,

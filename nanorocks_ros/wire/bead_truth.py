@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.records import BeadsTruth
-from nanorocks_ros.wire.array_layouts import NS, LayoutField
+from nanorocks_ros.records import NS, BeadsTruth
+from nanorocks_ros.wire.array_layouts import LayoutField
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.flags import flag_of, settings_from
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, rows
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.film_import.import_each import ImportBatch
     from nanorocks_ros.studies.film_import.import_result import ImportResult
 
-NS = 1_000_000_000
 # Flags of this command for settings of the pipeline; their names in `analyse` do as well.
 _EXPERIMENT = {
     'trays': '--trays',

@@ -10,11 +10,12 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.records import NS
+
 if TYPE_CHECKING:
     from nanorocks_ros.studies.inspection.bag_info import BagInfo, TopicReport
 
 _MB = 1e6
-NS = 1_000_000_000
 
 
 def add_parser(commands: Any) -> None:

@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
+from nanorocks_ros.records import NS
 from nanorocks_ros.wire.array_layouts import layout, to_array
 from nanorocks_ros.wire.bead_truth import beads_layout, beads_to_array
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord, BeadsTruth
     from nanorocks_ros.wire.topics import Topic
 
-NS = 1_000_000_000
 _ENCODINGS = {('uint8', 3): 'bgr8', ('uint8', 2): 'mono8', ('float32', 2): '32FC1'}
 
 

@@ -13,7 +13,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
-from nanorocks_ros.nodes.base.ros_messages import NS, message_class, qos_of
+from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
+from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.nodes.sources.playback_clock import NS
 from nanorocks_ros.recordings.bag.played_range import played_range
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.records import NS
+
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-NS = 1_000_000_000
 
 
 class PlaybackClock:

@@ -6,7 +6,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.nodes.sources.flow_control import FlowControl
-from nanorocks_ros.nodes.sources.playback_clock import NS, PlaybackClock
+from nanorocks_ros.nodes.sources.playback_clock import PlaybackClock
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -24,7 +24,7 @@ from rosbags.serde import SerdeError
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.recordings.bag.connections import add_connection
 from nanorocks_ros.recordings.messages.message_types import standard_types
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

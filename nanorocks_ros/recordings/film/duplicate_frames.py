@@ -12,7 +12,7 @@ import cv2
 
 from nanorocks_ros.numerics.picture_shift import is_shifted, repeats_often, shifted_share
 from nanorocks_ros.recordings.film.film_source import EncodedImage
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -25,7 +25,7 @@ from nanorocks_ros.recordings.film.image_file import FULL_BITS, bits_used, read_
 from nanorocks_ros.recordings.film.natural_sort import natural_key, varying_numbers
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.messages.iso8601 import parse_iso8601
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

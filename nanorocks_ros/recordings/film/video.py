@@ -29,7 +29,7 @@ from nanorocks_ros.recordings.film.video_streams import (
 )
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg, jpeg_head, with_huffman_tables
 from nanorocks_ros.recordings.messages.image_messages import is_decodable
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

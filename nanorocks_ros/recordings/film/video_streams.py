@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film.pyav import pyav
 from nanorocks_ros.recordings.messages.iso8601 import parse_iso8601
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,7 +20,8 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import (
 from nanorocks_ros.recordings.mcap.mcap_index import McapIndex, read_index, recorder_notes
 from nanorocks_ros.recordings.mcap.mcap_scan import scan
 from nanorocks_ros.recordings.offered_qos import recorded_qos
-from nanorocks_ros.recordings.storage import NS, BagMessage, TopicInfo
+from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator

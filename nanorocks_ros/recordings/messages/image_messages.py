@@ -10,8 +10,7 @@ import numpy as np
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.recordings.jpeg_header import START as JPEG_START
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg
-from nanorocks_ros.recordings.storage import NS
-from nanorocks_ros.records import Frame
+from nanorocks_ros.records import NS, Frame
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from datetime import datetime, timezone
 
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 
 def parse_iso8601(text: str) -> int | None:

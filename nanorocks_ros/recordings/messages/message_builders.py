@@ -8,7 +8,7 @@ import numpy as np
 from rosbags.typesys.stores import ros2_jazzy as jazzy
 
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

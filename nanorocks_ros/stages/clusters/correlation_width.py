@@ -17,6 +17,7 @@ from nanorocks_ros.inference.cluster_size.size_from_width import (
 )
 from nanorocks_ros.physics.autocorrelation import LevelRegion, autocorrelation, level_region
 from nanorocks_ros.records import (
+    NS,
     UNKNOWN,
     Autocorrelation,
     ClusterEstimate,
@@ -27,7 +28,6 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.clusters.background_removal import tray_contrast, tray_levels
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.preprocess.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.stage import RestartingStage
 
@@ -116,6 +116,8 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
 
     Attributes
     ----------
+    curve : ClusterCurve or None
+        Calibration of this tray.
     emit_image : bool
         Also emit each :class:`Autocorrelation`; off by default.
 
@@ -130,7 +132,7 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings
         self._tray = tray
-        self._curve, self._notice = _curve(settings, tray)
+        self.curve, self._notice = _curve(settings, tray)
         self.emit_image = False
         self.reset()
 
@@ -170,7 +172,7 @@ class ClusterAutocorrelator(RestartingStage[TrayImage, Correlations]):
     def _estimate(self, image: TrayImage, correlation: Correlated) -> ClusterEstimate:
         region = correlation.region(self._settings.clusters.level)
         width = correlation.width(region.area)
-        size = _NO_SIZE if self._curve is None else self._curve.size_of(width)
+        size = _NO_SIZE if self.curve is None else self.curve.size_of(width)
         area, inner = width.level_area, width.inner_area
         return ClusterEstimate(
             stamp_ns=image.stamp_ns,

@@ -17,7 +17,6 @@ from nanorocks_ros.numerics.quantiles import Quantile
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-NS = 1_000_000_000
 
 # Half a second of pictures at 30 Hz: longer than a jump takes, shorter than a decay.
 MEMORY_FRAMES = 15

@@ -13,14 +13,13 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.picture_shift import is_shifted, repeats_often, shifted_share
 from nanorocks_ros.numerics.quantiles import Quantile, median
-from nanorocks_ros.records import Notice, Quality
+from nanorocks_ros.records import NS, Notice, Quality
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.records import Frame
 
-NS = 1_000_000_000
 # Steps of the sample of rows and columns: the whole frame would cost as much as all other work.
 _ROW_STEP = 16
 _COLUMN_STEP = 4

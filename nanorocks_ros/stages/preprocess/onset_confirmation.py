@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.numerics.quantiles import median
-from nanorocks_ros.stages.preprocess.difference_noise import MEMORY_FRAMES, NS
+from nanorocks_ros.records import NS
+from nanorocks_ros.stages.preprocess.difference_noise import MEMORY_FRAMES
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,7 +13,7 @@ from nanorocks_ros.experiment.calibration_file import calibrated, load_calibrati
 from nanorocks_ros.experiment.plate import Region, regions_on_plate
 from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.numerics.quantiles import median
-from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
+from nanorocks_ros.records import NS, Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
 from nanorocks_ros.stages.preprocess.scale_advice import misfit_remedy
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.stages.preprocess.stabilise import Shift
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
-NS = 1_000_000_000
 # Frames at which the positions of the trays are checked.
 _POSITION_CHECKS = (8, 16)
 

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.quantiles import Quantile, median
+from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.difference_noise import (
     MEMORY_FRAMES,
     NOISE_QUANTILE,
-    NS,
     clipped_power,
     difference_counts,
     total_power,

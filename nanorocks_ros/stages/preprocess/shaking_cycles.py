@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.stages.preprocess.difference_noise import NS
+from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
 from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
 

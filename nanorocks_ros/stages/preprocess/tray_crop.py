@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.numerics.picture_jitter import JitterMeter
-from nanorocks_ros.records import UNKNOWN, Quality
+from nanorocks_ros.records import NS, UNKNOWN, Quality
 from nanorocks_ros.stages.preprocess.rectify import (
     mix_weights,
     nodes_of,
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.view import View
     from nanorocks_ros.settings import PipelineSettings
 
-NS = 1_000_000_000
 # A smaller shift is ignored, since an interpolation blurs the picture.
 _NEGLIGIBLE_PX = 0.04
 _SIGNIFICANT = 2.0

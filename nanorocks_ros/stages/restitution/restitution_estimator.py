@@ -11,6 +11,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import (
+    NS,
     CorEstimate,
     CorStatus,
     Measured,
@@ -23,7 +24,6 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
 from nanorocks_ros.stages.restitution.restitution_methods import (
     LARGEST_TENSION,

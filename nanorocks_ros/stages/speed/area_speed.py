@@ -12,6 +12,7 @@ import numpy as np
 
 from nanorocks_ros.physics.moving_area import mean_displacement
 from nanorocks_ros.records import (
+    NS,
     Measured,
     MotionMask,
     Quality,
@@ -19,7 +20,6 @@ from nanorocks_ros.records import (
     SpeedMethod,
     TrayImage,
 )
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.speed.motion_mask import MotionMasker
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from nanorocks_ros.physics.crowded_grains import (
     path_of_displacement,
     persistence_length,
 )
-from nanorocks_ros.stages.preprocess.difference_noise import NS, difference_power
+from nanorocks_ros.records import NS
+from nanorocks_ros.stages.preprocess.difference_noise import difference_power
 from nanorocks_ros.stages.speed.structure_function import ImagePair, Sample, StructureFunction
 
 if TYPE_CHECKING:

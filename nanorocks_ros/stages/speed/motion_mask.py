@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from nanorocks_ros.stages.preprocess.difference_noise import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.stages.preprocess.difference_noise import NS
+from nanorocks_ros.records import NS
 from nanorocks_ros.stages.speed.crowded_structure_function import (
     CrowdedGrains,
     CrowdedStructureFunction,

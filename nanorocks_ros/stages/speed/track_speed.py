@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.records import (
+    NS,
     UNKNOWN_MEASURED,
     Measured,
     Quality,
@@ -18,7 +19,6 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (
     NOISE_FRAMES,

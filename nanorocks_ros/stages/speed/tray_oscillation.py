@@ -6,9 +6,8 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import UNKNOWN, SpeedEstimate
+from nanorocks_ros.records import NS, UNKNOWN, SpeedEstimate
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 
 if TYPE_CHECKING:
     from nanorocks_ros.records import TrayImage

@@ -16,9 +16,9 @@ from nanorocks_ros.recordings.messages.image_messages import (
     frame_from_image,
     valid_stamp_ns,
 )
-from nanorocks_ros.records import Frame, GroundTruth
+from nanorocks_ros.records import NS, Frame, GroundTruth
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import NS, from_array
+from nanorocks_ros.wire.array_layouts import from_array
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.records import CorStatus, Quality, SpeedMethod
+from nanorocks_ros.records import NS, CorStatus, Quality, SpeedMethod
 from nanorocks_ros.records.result_words import (
     METHODS,
     NO_SHAKING,
@@ -22,7 +22,6 @@ from nanorocks_ros.records.result_words import (
     sticking_in_words,
     wall_flag,
 )
-from nanorocks_ros.wire.array_layouts import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -11,6 +11,7 @@ import numpy as np
 from nanorocks_ros.outputs.disk_list import Spool, SpoolFile
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.records import (
+    NS,
     BodyEstimate,
     ClusterEstimate,
     CorEstimate,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord, RecordType
     from nanorocks_ros.settings import PipelineSettings
 
-NS = 1_000_000_000
 
 # A gap of more than this many usual intervals means that frames are missing.
 _GAP = 1.5

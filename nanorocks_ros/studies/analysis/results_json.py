@@ -8,14 +8,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import finite_or_none
-from nanorocks_ros.records import ClusterEstimate, CorEstimate, CorStatus
+from nanorocks_ros.records import NS, ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.studies.analysis.cycle_words import (
     cycle_as_json,
     is_left_out,
     tray_reason,
     used_speeds,
 )
-from nanorocks_ros.wire.array_layouts import NS, layout
+from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:

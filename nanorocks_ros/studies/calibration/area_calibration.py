@@ -9,13 +9,12 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
-from nanorocks_ros.records import SpeedEstimate, Tracks
+from nanorocks_ros.records import NS, SpeedEstimate, Tracks
 from nanorocks_ros.settings import with_values
 from nanorocks_ros.stages.tracking.mean_speed import MeanSpeed, mean_speed
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.calibration.area_fit import AreaFit, SpeedPair, fit_area
 from nanorocks_ros.studies.calibration.track_comparison import MarkedBeads, manual_reference
-from nanorocks_ros.wire.array_layouts import NS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

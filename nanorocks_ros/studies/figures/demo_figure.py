@@ -9,8 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
-from nanorocks_ros.records import CorRelation, CorStatus
-from nanorocks_ros.wire.array_layouts import NS
+from nanorocks_ros.records import NS, CorRelation, CorStatus
 
 mpl.use('Agg')
 from matplotlib.figure import Figure

@@ -13,7 +13,7 @@ from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.recordings.film.image_folder import ImageFolder, images_in
 from nanorocks_ros.recordings.film.video import Video
 from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 from nanorocks_ros.studies.film_import.find_films import films_in_folder
 from nanorocks_ros.studies.synthetic.film_bag import check_quality
 

@@ -18,7 +18,7 @@ from nanorocks_ros.recordings.film.timestamp_repair import Stamped, TimestampRep
 from nanorocks_ros.recordings.messages.camera_info import info_message
 from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
 from nanorocks_ros.recordings.messages.message_builders import compressed_image_message
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 from nanorocks_ros.studies.film_import.film_inputs import (
     ImportSettings,
     check_order,

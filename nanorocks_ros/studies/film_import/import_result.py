@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from pathlib import Path

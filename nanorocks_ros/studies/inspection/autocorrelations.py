@@ -15,12 +15,11 @@ from nanorocks_ros.physics.paper_clusters import (
     paper_calibration,
     paper_onset,
 )
-from nanorocks_ros.records import Autocorrelation, ClusterEstimate, Notice
+from nanorocks_ros.records import NS, Autocorrelation, ClusterEstimate, Notice
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.libraries.cluster_films import cluster_sizes
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import NS
 from nanorocks_ros.wire.bead_truth import beads_from_array
 from nanorocks_ros.wire.flat_records import flat_value
 

@@ -16,7 +16,7 @@ from nanorocks_ros.experiment.recorded_experiment import recorded_settings
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
 from nanorocks_ros.recordings.messages.image_messages import image_kind
-from nanorocks_ros.recordings.storage import NS
+from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.wire import topics
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.view import IdentityLens, View
+from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.rectify import (
     mix_weights,
     nodes_of,
@@ -19,7 +20,6 @@ from nanorocks_ros.stages.preprocess.rectify import (
 from nanorocks_ros.stages.speed.motion_mask import MotionMasker
 from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
-from nanorocks_ros.wire.array_layouts import NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

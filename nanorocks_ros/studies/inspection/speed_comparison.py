@@ -9,10 +9,9 @@ import numpy as np
 
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
-from nanorocks_ros.records import SpeedEstimate
+from nanorocks_ros.records import NS, SpeedEstimate
 from nanorocks_ros.settings import with_values
 from nanorocks_ros.studies.analysis.bag_images import BagImages
-from nanorocks_ros.wire.array_layouts import NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -11,8 +11,8 @@ import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.records import NS
 from nanorocks_ros.studies.inspection.speed_comparison import AUTO, METHODS
-from nanorocks_ros.wire.array_layouts import NS
 
 mpl.use('Agg')
 from matplotlib.figure import Figure

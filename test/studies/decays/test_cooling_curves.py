@@ -12,6 +12,7 @@ from decays import simulated_table, write_rows
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.records import (
+    NS,
     Measured,
     SpeedEstimate,
     SpeedMethod,
@@ -27,7 +28,6 @@ from nanorocks_ros.studies.decays.cooling_curves import (
     read_decay,
     speed_table,
 )
-from nanorocks_ros.wire.array_layouts import NS
 
 LAW = [(0.1 * k, 0.01 / (1.0 + 0.1 * k)) for k in range(1, 30)]
 

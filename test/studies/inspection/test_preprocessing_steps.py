@@ -14,7 +14,7 @@ from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
-from nanorocks_ros.records import MotionMask
+from nanorocks_ros.records import NS, MotionMask
 from nanorocks_ros.settings import (
     CompressionSettings,
     PipelineSettings,
@@ -27,7 +27,6 @@ from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import NS
 
 FRAMES = 18
 SCALE = 7500.0

@@ -16,6 +16,7 @@ from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.records import (
+    NS,
     GroundTruth,
     Measured,
     SpeedEstimate,
@@ -32,7 +33,6 @@ from nanorocks_ros.studies.inspection.speed_comparison import (
 )
 from nanorocks_ros.studies.synthetic.film_bag import film_into_bag
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import NS
 
 SECONDS = 6.0
 
