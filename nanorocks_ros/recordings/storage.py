@@ -1,6 +1,6 @@
 """The interface of storage files (MCAP, SQLite) and the values they return.
 
-Tested by ``test/recordings/messages/test_message_builders.py``.
+Tested by ``test/recordings/bag/test_reader.py``.
 """
 
 from __future__ import annotations
