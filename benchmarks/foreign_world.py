@@ -202,11 +202,18 @@ def _restitution_row(tray: int, films: list[_Read]) -> str:
     )
     error, half = wide[:, 0] - beads, 0.5 * (wide[:, 2] - wide[:, 1])
     far = int(np.sum(np.abs(error) > _HALF_WIDTHS * half))
-    standard_error = error.std(ddof=1) / math.sqrt(error.size) if error.size > 1 else math.nan
-    row += f'| {error.mean():+.4f} ± {standard_error:.4f} | {error.std():.3f} '
+    row += f'| {_bias(error)}'
     row += f'| {_covered(narrow, beads)} | {_covered(wide, beads)} | {half.mean():.3f} '
     bias_of_walls = np.nanmean(of_walls[:, 0] - walls)
     return row + f'| {bias_of_walls:+.4f} | {_covered(of_walls, walls)} | {far} |'
+
+
+def _bias(error: NDArray[np.float64]) -> str:
+    """Mean and scatter of errors, for two columns; of a single film no scatter is known."""
+    if error.size < 2:
+        return f'{error.mean():+.4f} | - '
+    standard_error = error.std(ddof=1) / math.sqrt(error.size)
+    return f'{error.mean():+.4f} ± {standard_error:.4f} | {error.std():.3f} '
 
 
 def _limits(interval: Interval) -> tuple[float, float, float]:
