@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff_law import haff_speed
-from nanorocks_ros.records import CorStatus, Measured, Quality, Rebound, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import CorStatus, Measured, Quality, SpeedEstimate, SpeedMethod
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
@@ -33,26 +34,10 @@ def speeds(cycle, haff_time):
         )
 
 
-def rebounds(cycle, wall, n=60):
+def rebounds(cycle, wall):
     rng = np.random.default_rng(100 + cycle)
-    error = 1e-5
-    for time in np.sort(rng.uniform(2.0, 18.0, n)):
-        incoming = rng.uniform(1e-3, 4e-3)
-        noise = rng.normal(0.0, error, 2)
-        yield Rebound(
-            stamp_ns=round((cycle * PERIOD + time) * NS),
-            tray=1,
-            track=0,
-            species=0,
-            wall=0,
-            incoming=Measured(incoming + noise[0], error),
-            outgoing=Measured(wall * incoming + noise[1], error),
-            tangential_incoming=0.0,
-            tangential_outgoing=0.0,
-            tangential_error=error,
-            wall_velocity=Measured(0.0, 0.0),
-            place=np.zeros(2),
-        )
+    first = cycle * PERIOD
+    return wall_rebounds(rng, 60, first + 2.0, first + 18.0, wall, error=1e-5)
 
 
 def final_estimates(*, include):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
@@ -51,28 +52,6 @@ def cooling_cycle(cycle=1, start=0.0, v0=6e-3, tau=5.0, until=25.0, noise=0.01):
     times = np.arange(0.1, until, 0.1)
     values = haff_speed(times, v0, tau) * np.exp(rng.normal(0, noise, times.size))
     return [speed(start + t, v, cycle, start) for t, v in zip(times, values, strict=True)]
-
-
-def rebounds(rng, n, first, last, wall=0.97):
-    """Of beads from a side wall, with errors of 3 % of a fast one."""
-    error = 1e-4
-    for time in np.sort(rng.uniform(first, last, n)):
-        incoming = rng.uniform(1e-3, 4e-3)
-        noise = rng.normal(0.0, error, 2)
-        yield Rebound(
-            stamp_ns=round(time * NS),
-            tray=1,
-            track=0,
-            species=0,
-            wall=0,
-            incoming=Measured(incoming + noise[0], error),
-            outgoing=Measured(wall * incoming + noise[1], error),
-            tangential_incoming=0.0,
-            tangential_outgoing=0.0,
-            tangential_error=error,
-            wall_velocity=Measured(0.0, 0.0),
-            place=np.zeros(2),
-        )
 
 
 def all_estimates(stage, speeds):
@@ -336,7 +315,7 @@ def half_width(estimate):
 
 def test_rebounds_fix_the_walls_and_through_the_valley_the_beads():
     speeds = simulated_cycle()
-    seen = list(rebounds(np.random.default_rng(1), 80, 2.0, 17.0))
+    seen = list(wall_rebounds(np.random.default_rng(1), 80, 2.0, 17.0))
     *_, without = all_estimates(fitter(), speeds)
     *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
     assert (without.rebounds, final.rebounds) == (0, 80)
@@ -356,7 +335,7 @@ def by_stamp(records):
 
 def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
     speeds = simulated_cycle()
-    seen = list(rebounds(np.random.default_rng(1), 40, 1.0, 22.0))
+    seen = list(wall_rebounds(np.random.default_rng(1), 40, 1.0, 22.0))
     late = sorted(
         [*speeds, *seen],
         key=lambda record: record.stamp_ns + int(1.9 * NS) * isinstance(record, Rebound),
@@ -370,7 +349,7 @@ def test_it_does_not_matter_when_in_two_seconds_a_contact_comes_in():
 
 def test_at_the_end_of_a_recording_contacts_count_up_to_the_last_speed():
     speeds = [estimate for estimate in simulated_cycle() if estimate.stamp_ns < 15 * NS]
-    seen = list(rebounds(np.random.default_rng(1), 40, 2.0, 16.0))
+    seen = list(wall_rebounds(np.random.default_rng(1), 40, 2.0, 16.0))
     last_ns = speeds[-1].stamp_ns
     expected = sum(contact.stamp_ns <= last_ns for contact in seen)
     ripe = sum(contact.stamp_ns <= last_ns - 2 * NS for contact in seen)
@@ -391,7 +370,7 @@ def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
         replace(record, tray_speed=1.0 if record.stamp_ns < 8.0 * NS else 0.0)
         for record in simulated_cycle()
     ]
-    seen = list(rebounds(np.random.default_rng(1), 60, 0.5, 20.0))
+    seen = list(wall_rebounds(np.random.default_rng(1), 60, 0.5, 20.0))
     *_, final = all_estimates(fitter(), by_stamp([*swinging, *seen]))
     assert final.window_start == pytest.approx(8.0, abs=0.11)
     last = (final.window_end - 2.0) * NS
@@ -400,7 +379,7 @@ def test_contacts_in_a_tray_that_swings_count_though_speeds_do_not():
 
 
 def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
-    seen = rebounds(np.random.default_rng(1), 80, 2.0, 17.0, wall=0.8)
+    seen = wall_rebounds(np.random.default_rng(1), 80, 2.0, 17.0, wall=0.8)
     # With walls of 0.8 no gas could have cooled so slowly.
     speeds = simulated_cycle(restitution=0.95, wall=1.0)
     *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
@@ -415,7 +394,7 @@ def test_contacts_of_all_cycles_count_in_the_mean():
         start = 30.0 * cycle
         records = [
             *simulated_cycle(cycle, start),
-            *rebounds(rng, 30, start + 2.0, start + 17.0),
+            *wall_rebounds(rng, 30, start + 2.0, start + 17.0),
         ]
         estimates = all_estimates(stage, by_stamp(records))
         finals += [record for record in estimates if record.status is CorStatus.FINAL]
@@ -459,7 +438,10 @@ def test_the_window_ends_with_the_first_merge():
 
 def test_contacts_since_a_merge_that_is_known_late_are_not_used():
     rng = np.random.default_rng(5)
-    before, since = list(rebounds(rng, 20, 2.0, 11.0)), list(rebounds(rng, 30, 12.0, 15.0))
+    before, since = (
+        list(wall_rebounds(rng, 20, 2.0, 11.0)),
+        list(wall_rebounds(rng, 30, 12.0, 15.0)),
+    )
     late = merge(12.05, known=6.0)
     finals = [
         all_estimates(fitter(), as_known([*simulated_cycle(), *contacts, late]))[-1]
