@@ -65,7 +65,7 @@ class StickingStatus(IntEnum):
 class Quality(IntFlag):
     """Defects of the tray images since the last estimate, or of a speed from them.
 
-    0 when nothing is; docs/method/speed.md says what each flag means.
+    0 when nothing is; docs/reference/flags.md says what each flag means.
     """
 
     SATURATED = 1

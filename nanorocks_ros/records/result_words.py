@@ -62,8 +62,10 @@ FLAGS = {
         'reflections hide more than 1 % of the tray', 'move the lamp, or trust slow beads less'
     ),
     Quality.STABILISATION_LOST: Words(
-        'the motion of the tray could not be measured',
-        'below a few mm/s its swing is in the speeds; film the rim of the tray, too',
+        'the motion of the tray could not be measured, or tray and camera move and cannot be told '
+        'apart',
+        'below a few mm/s the motion is in the speeds; mount the camera firmly, and film the rim '
+        'of the tray, too',
     ),
     Quality.GRAY_CAMERA: Words(
         'the pictures have no colour: no tracks, species are not separated', 'film in colour'
@@ -125,7 +127,7 @@ def flags_in_words(quality: Quality) -> list[FlagWords]:
     for flag in Quality:
         if flag in quality and flag.name:
             name = flag.name.lower()
-            known = FLAGS.get(flag, Words(name.replace('_', ' '), 'see docs/method/speed.md'))
+            known = FLAGS.get(flag, Words(name.replace('_', ' '), 'see docs/reference/flags.md'))
             words.append(FlagWords(name, *known))
     return words
 

@@ -1,4 +1,4 @@
-"""Pages of the documentation that are generated: topics and array layouts, parameters.
+"""Pages of the documentation that are generated: topics, array layouts, parameters, flags.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import settings as st
+from nanorocks_ros.records import Quality
+from nanorocks_ros.records.result_words import FLAGS
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
@@ -148,6 +150,24 @@ def parameters_page() -> str:
     return text
 
 
+def flags_page() -> str:
+    """Every flag with its meaning and remedy, from the register of words."""
+    text = _NOTE + '# Flags\n\n'
+    text += (
+        '`quality` is a sum of these values, 0 where no fault is known; the tables and the JSON '
+        'of `nanorocks analyse` and `/diagnostics` name them. '
+        '[speed.md](../method/speed.md#the-flags) says when the less obvious ones are set.\n\n'
+    )
+    return text + _table(
+        ('flag', 'value', 'meaning', 'what to do'),
+        (
+            (f'`{flag.name.lower()}`', str(flag.value), FLAGS[flag].text, FLAGS[flag].remedy)
+            for flag in Quality
+            if flag.name
+        ),
+    )
+
+
 def _default(value: st.Value) -> str:
     if isinstance(value, tuple):
         return ', '.join(f'{number:g}' for number in value) or 'empty'
@@ -167,6 +187,7 @@ def _range(row: st.SettingRow) -> str:
 FILES = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
+    'docs/reference/flags.md': flags_page,
 }
 
 
