@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import fftconvolve
@@ -43,6 +44,9 @@ _FILLINGS = (0.5, 0.75, 1.25)
 _CONTROLS = 17
 _CONTROL_TIMES = tuple(0.2 * k for k in range(1, 21))
 _COUNTS = dict.fromkeys(_ALL, 1.0)
+# Limits of the sizes for which offsets are compared, [beads]; below the first all are single.
+_SIZES = (1.1, 1.5, 2.5, 5.0, 10.0, 20.0, 80.0)
+_FEWEST_IMAGES = 20
 _FLIGHT = dict.fromkeys(EFFECTS, 1.0)
 
 
@@ -64,6 +68,7 @@ def report() -> None:
     _sizes(samples)
     _fillings(samples)
     _effects()
+    _offsets()
     _controls(samples)
 
 
@@ -287,6 +292,36 @@ def _slopes(log_size, read, strengths, runs):
     slopes = np.linalg.lstsq(centred, residual, rcond=None)[0] / sd
     means = np.array([residual[runs == run].mean() for run in np.unique(runs)])
     return slopes, means.std() / sd
+
+
+def _offsets() -> None:
+    """Print what the offset of single beads tells of clusters, from the calibration's samples."""
+    print('readings about the curve, before and after the mean offset of single beads of the same')
+    print('film is subtracted, standard deviation, and the part of the offset that they share\n')
+    bins = ' | '.join(f'{low:g} to {high:g} beads' for low, high in pairwise(_SIZES))
+    print(f'| tray | films | {bins} |\n| --- | --- |' + ' --- |' * (len(_SIZES) - 1))
+    shares = []
+    for tray in (1, 3, 5, 7):
+        curve = curve_of(load_trays()[tray])
+        rows = curve.samples.astype(np.float64)
+        runs, size = rows[:, 0].astype(int), rows[:, 2]
+        read = np.log(rows[:, 3] / rows[:, 4]) + curve.weight * np.log(rows[:, 3])
+        residual = read - np.interp(np.log(size), curve.log_size, curve.reading)
+        single = size < _SIZES[0]
+        offsets = {run: residual[single & (runs == run)].mean() for run in set(runs[single])}
+        offset = np.array([offsets.get(run, np.nan) for run in runs])
+        cells = []
+        for low, high in pairwise(_SIZES):
+            chosen = (low <= size) & (size < high) & np.isfinite(offset)
+            if chosen.sum() < _FEWEST_IMAGES:
+                cells.append('-')
+                continue
+            other, known = residual[chosen], offset[chosen]
+            share = known @ (other - other.mean()) / (known @ known)
+            shares.append(share)
+            cells.append(f'{other.std():.3f}, {(other - known).std():.3f}, {share:.2f}')
+        print(f'| {tray} | {len(offsets)} | ' + ' | '.join(cells) + ' |')
+    print(f'\nshare: mean {np.mean(shares):.2f}, scatter {np.std(shares, ddof=1):.2f}\n')
 
 
 def _controls(samples: dict[str, np.ndarray]) -> None:

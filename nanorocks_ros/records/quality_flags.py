@@ -47,6 +47,7 @@ class SizeStatus(IntEnum):
     NOTHING = 3
     INSENSITIVE = 4
     UNCALIBRATED = 5
+    CONTRADICTED = 6
 
 
 class StickingStatus(IntEnum):

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.records import UNKNOWN, SizeStatus
+from nanorocks_ros.records import UNKNOWN, Measured, SizeStatus
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,6 +37,8 @@ INNER_LEVEL = 0.7
 _COVER = 0.68
 # Number of sizes on the grid for an interval.
 _GRID = 400
+# A camera as those of the calibration; its variation is in the scatter of the curve.
+_NO_OFFSET = Measured(0.0, 0.0)
 
 
 class Width(NamedTuple):
@@ -136,16 +138,38 @@ class ClusterCurve:
             < self.breadths[1] * width.inner_area
         ):
             return _unknown(SizeStatus.NOTHING)
-        read = math.log(width.level_area / width.inner_area)
-        read += self.weight * math.log(width.level_area)
-        lower, upper = self._interval(read)
+        return self.size_at(self.reading_of(width.level_area, width.level_area / width.inner_area))
+
+    def reading_of(self, level_area: float, breadth: float) -> float:
+        """Reading of an image.
+
+        Parameters
+        ----------
+        level_area : float, [m^2]
+        breadth : float
+        """
+        return math.log(breadth) + self.weight * math.log(level_area)
+
+    def size_at(self, reading: float, offset: Measured = _NO_OFFSET) -> SizeEstimate:
+        """Size at a reading, MEASURED or BEYOND.
+
+        Parameters
+        ----------
+        reading : float
+        offset : Measured
+            Of the readings of this camera from those of the calibration.
+        """
+        read = reading - offset.value
+        lower, upper = self._interval(read, offset.error)
         size = self._inverse(read)
         if math.isnan(size):
             return SizeEstimate(UNKNOWN, UNKNOWN, lower, upper, SizeStatus.BEYOND)
         return SizeEstimate(size, 0.5 * (upper - lower), lower, upper, SizeStatus.MEASURED)
 
-    def _interval(self, read: float) -> tuple[float, float]:
+    def _interval(self, read: float, error: float) -> tuple[float, float]:
         """Smallest and largest size whose mean reading is within one standard deviation.
+
+        The scatter of the calibration and the error of the offset add up.
 
         All simulated sizes count, also those beyond the end: where the curve is flat, an image
         with the reading of ten beads may show a cluster of all beads.
@@ -153,7 +177,7 @@ class ClusterCurve:
         near = min(max(read, self.reading[0]), self.reading[-1])
         log_size = np.linspace(0.0, self.log_size[-1], _GRID)
         reading = np.interp(log_size, self.log_size, self.reading)
-        scatter = np.interp(log_size, self.log_size, self.scatter)
+        scatter = np.hypot(np.interp(log_size, self.log_size, self.scatter), error)
         inside = log_size[np.abs(near - reading) <= scatter]
         return math.exp(inside[0]), math.exp(inside[-1])
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.records import (
+    NS,
     UNKNOWN_MEASURED,
     UNKNOWN_MEASURED_INTERVAL,
     Autocorrelation,
@@ -14,6 +15,7 @@ from nanorocks_ros.records import (
     ClusterEstimate,
     Interval,
     Measured,
+    MeasuredInterval,
     Merge,
     Notice,
     Quality,
@@ -21,11 +23,12 @@ from nanorocks_ros.records import (
     SpeedEstimate,
     StickingStatus,
     TrayImage,
+    sizes_disagree,
 )
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
+from nanorocks_ros.stages.clusters.reading_offset import ReadingOffset
 from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
@@ -42,6 +45,8 @@ _UPDATE_NS = NS
 _RECENT_NS = NS
 # Smallest error of a size, [beads].
 _SMALLEST_ERROR = 0.01
+# States in which the width has a reading on the curve.
+_WITH_READING = (SizeStatus.MEASURED, SizeStatus.BEYOND)
 
 Input = TrayImage | SpeedEstimate | BodyEstimate | Merge
 Clusters = ClusterEstimate | Autocorrelation | Notice
@@ -80,6 +85,8 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         self._images.reset(stamp_ns)
+        curve = self._images.curve
+        self._offset = ReadingOffset(curve) if curve is not None else None
         # With whether the scale of the picture is wrong.
         self._held: deque[tuple[ClusterEstimate, bool]] = deque()
         # The last one, with its cycle and second.
@@ -161,11 +168,38 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
             fields |= {
                 'mean_sticking_speed': Interval(of_all.sticking_speed, of_all.lower, of_all.upper),
             }
+        weighted_size = fields.get('weighted_size', UNKNOWN_MEASURED)
+        estimate = self._with_offset(estimate, weighted_size)
         size = _combined(
             Measured(estimate.cluster_size.value, estimate.cluster_size.error),
-            fields.get('weighted_size', UNKNOWN_MEASURED),
+            weighted_size,
         )
         return replace(estimate, combined_size=size, **fields)
+
+    def _with_offset(self, estimate: ClusterEstimate, weighted_size: Measured) -> ClusterEstimate:
+        """The estimate with the size by the offset of this camera, as far as that is known."""
+        offset, cycle, stamp_ns = self._offset, estimate.cycle, estimate.stamp_ns
+        if offset is None:
+            return estimate
+        offset.follow(cycle, stamp_ns)
+        first_merge_ns = self._sticking.first_merge_ns(cycle, stamp_ns)
+        if first_merge_ns is not None:
+            offset.forget(cycle, first_merge_ns)
+        if estimate.size_status not in _WITH_READING:
+            return estimate
+        reading = offset.curve.reading_of(estimate.level_area, estimate.breadth)
+        if first_merge_ns is None and offset.certainly_single(weighted_size):
+            offset.learn(reading, stamp_ns)
+        of_camera = offset.known()
+        if of_camera is None:
+            disagree = sizes_disagree(estimate.cluster_size, weighted_size)
+            return _contradicted(estimate) if disagree else estimate
+        size = offset.curve.size_at(reading, of_camera)
+        return replace(
+            estimate,
+            cluster_size=MeasuredInterval(size.size, size.error, size.lower, size.upper),
+            size_status=size.status,
+        )
 
     def _sticking_speed_of(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """Sticking speed of the cycle, as of the last full second."""
@@ -182,6 +216,16 @@ def _without_size(estimate: ClusterEstimate) -> ClusterEstimate:
         estimate,
         size_status=SizeStatus.NOTHING,
         cluster_size=UNKNOWN_MEASURED_INTERVAL,
+    )
+
+
+def _contradicted(estimate: ClusterEstimate) -> ClusterEstimate:
+    """The estimate of which the tracks say that it is wrong: only its interval is left."""
+    limits = estimate.cluster_size
+    return replace(
+        estimate,
+        size_status=SizeStatus.CONTRADICTED,
+        cluster_size=replace(UNKNOWN_MEASURED_INTERVAL, lower=limits.lower, upper=limits.upper),
     )
 
 

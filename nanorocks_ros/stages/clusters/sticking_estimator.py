@@ -16,9 +16,8 @@ from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, M
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate_of
 from nanorocks_ros.physics.sticking_rates import slow_contacts
-from nanorocks_ros.records import BodyEstimate, Merge, Quality, SpeedEstimate
+from nanorocks_ros.records import NS, BodyEstimate, Merge, Quality, SpeedEstimate
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
-from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
@@ -120,13 +119,17 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         # Of several with the same stamp the one that came in first.
         return own.bodies[bisect_left(own.bodies, _stamp(own.bodies[count - 1]), key=_stamp)]
 
+    def first_merge_ns(self, cycle: int, stamp_ns: int) -> int | None:
+        """Stamp of the first merge of a cycle, as of an instant; None before."""
+        own = self._cycles.get(cycle)
+        known = self._known_merges(own, stamp_ns) if own else []
+        return min((merge.stamp_ns for merge in known), default=None)
+
     def onset(self, cycle: int, stamp_ns: int) -> float | None:
         """Time of the first merge since the shaking event, [s], as of an instant; None before."""
-        own = self._cycles.get(cycle)
-        known = [merge.stamp_ns for merge in self._known_merges(own, stamp_ns)] if own else []
-        if not known or own is None or own.start_ns is None:
-            return None
-        return (min(known) - own.start_ns) / NS
+        first_ns = self.first_merge_ns(cycle, stamp_ns)
+        start_ns = None if first_ns is None else self._cycles[cycle].start_ns
+        return None if first_ns is None or start_ns is None else (first_ns - start_ns) / NS
 
     def of_cycle(self, cycle: int, stamp_ns: int) -> StickingEstimate | None:
         """Sticking speed of the cycle up to an instant; None when it tells nothing."""

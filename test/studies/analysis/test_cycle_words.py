@@ -198,7 +198,7 @@ def test_flags_are_counted_in_the_speeds_of_the_window():
 def test_clusters_by_the_autocorrelation_that_the_tracks_contradict_are_flagged():
     size = MeasuredInterval(2.4, 0.9, 1.8, 3.7)
     contradicted = replace(CLUSTERS, cluster_size=size, weighted_size=Measured(1.0, 0.0))
-    assert 'the autocorrelation says 2.4 beads a cluster [1.8, 3.7], the tracks 1.0' in text_of(
+    assert 'the autocorrelation says 1.8 to 3.7 beads a cluster, the tracks 1.0' in text_of(
         FINAL, contradicted
     )
     agreed = replace(contradicted, weighted_size=Measured(2.1, 0.2))
