@@ -5,29 +5,28 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError, FrameError
+from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated, load_calibration
-from nanorocks_ros.experiment.plate import Region, regions_on_plate
 from nanorocks_ros.experiment.view import IdentityLens, View
 from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import NS, Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
-from nanorocks_ros.stages.preprocess.scale_advice import misfit_remedy
 from nanorocks_ros.stages.preprocess.shake_detection import PlateMeter
 from nanorocks_ros.stages.preprocess.shaking_cycles import HeldImages, ShakeCounter
 from nanorocks_ros.stages.preprocess.stabilise import shift_of_plate
 from nanorocks_ros.stages.preprocess.tray_crop import TrayCrop
 from nanorocks_ros.stages.preprocess.tray_position_check import position_problem
+from nanorocks_ros.stages.preprocess.tray_regions import TrayRegions, blue_first
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.experiment.plate import Region
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.stages.preprocess.stabilise import Shift
@@ -73,10 +72,9 @@ class Preprocessor:
         self._view = view
         self._shape: tuple[int, ...] | None = None
         self._encoding = ''
-        self._remedy = ''
         self._regions: tuple[Region, ...] = ()
         self._last_stamp_ns: int | None = None
-        self._check_regions()
+        self._tray_regions = TrayRegions(self._pipeline, self._trays, camera, view)
 
     @property
     def view(self) -> View | None:
@@ -167,7 +165,7 @@ class Preprocessor:
             return ()
         view = self._view or self._straight
         text, wrong = position_problem(
-            _blue_first(frame), view, self._regions, self._trays, self._pipeline
+            blue_first(frame), view, self._regions, self._trays, self._pipeline
         )
         before, self._suspects = self._suspects, wrong
         if self._frames != _POSITION_CHECKS[-1]:
@@ -253,8 +251,7 @@ class Preprocessor:
                 f'publish {", ".join(CHANNELS)}',
             )
         if self._shape is None:
-            self._check_lens(frame.image.shape)
-            self._regions = self._regions_in(frame)
+            self._regions = self._tray_regions.in_frame(frame)
             self._shape, self._encoding = frame.image.shape, frame.encoding
             self._start()
         elif frame.encoding != self._encoding:
@@ -271,82 +268,3 @@ class Preprocessor:
                 f'{width}x{height} px',
                 'record each size on its own, or restart after changing the camera',
             )
-
-    def _check_regions(self) -> None:
-        regions = self._settings.regions_px
-        count = len(self._trays)
-        if regions and len(regions) != 4 * count:
-            raise ConfigurationError(
-                'preprocess.regions_px',
-                f'{len(regions)} numbers for {count} trays',
-                'give x, y, width, height for each tray',
-            )
-        if not regions and count != 1 and self._settings.layout == 'centred':
-            raise ConfigurationError(
-                'preprocess.regions_px',
-                f'empty, with {count} trays',
-                'give x, y, width, height for each tray, or layout: plate; only a single tray '
-                'can be centred',
-            )
-        if len(self._settings.gray_mix) != 3 or sum(self._settings.gray_mix) > 1.0 + 1e-9:
-            raise ConfigurationError(
-                'preprocess.gray_mix',
-                f'{self._settings.gray_mix}',
-                'give three weights (blue, green, red) whose sum is at most 1',
-            )
-
-    def _check_lens(self, shape: tuple[int, ...]) -> None:
-        if self._view is None:
-            return
-        lens = self._view.camera
-        if (lens.height, lens.width) != shape[:2]:
-            raise FrameError(
-                self._camera,
-                f'the frame is {shape[1]}x{shape[0]} px, the calibration of the camera for '
-                f'{lens.width}x{lens.height} px',
-                'calibrate the camera at this size',
-            )
-
-    def _regions_in(self, frame: Frame) -> tuple[Region, ...]:
-        height, width = frame.image.shape[:2]
-        if self._settings.layout == 'plate' and not self._settings.regions_px:
-            scale = self._settings.pixels_per_metre
-            on_plate = regions_on_plate(self._trays, (height, width), scale)
-            return tuple(on_plate[tray.number] for tray in self._trays)
-        flat = self._settings.regions_px or self._centred(width, height)
-        regions = tuple(Region(*flat[i : i + 4]) for i in range(0, len(flat), 4))
-        for tray, (x, y, w, h) in zip(self._trays, regions, strict=True):
-            inside = x >= 0 and y >= 0 and x + w <= width and y + h <= height
-            if w < 8 or h < 8 or not (inside or self._settings.calibration):
-                raise FrameError(
-                    self._camera,
-                    f'tray {tray.number} at x={x} y={y} of {w}x{h} px does not lie inside '
-                    f'the {width}x{height} px frame',
-                    self._misfit_remedy(frame, tray),
-                )
-        return regions
-
-    def _misfit_remedy(self, frame: Frame, tray: Tray) -> str:
-        """What to do about a tray outside the frame; searched once, as all frames are refused."""
-        if not self._remedy:
-            straight = self._view is None and not self._settings.regions_px
-            self._remedy = (
-                misfit_remedy(_blue_first(frame), tray, self._pipeline)
-                if straight
-                else 'set preprocess.regions_px or preprocess.pixels_per_metre'
-            )
-        return self._remedy
-
-    def _centred(self, width: int, height: int) -> tuple[int, ...]:
-        sides = self._trays[0].dimensions
-        w = round(sides[0] * self._settings.pixels_per_metre)
-        h = round(sides[1] * self._settings.pixels_per_metre)
-        return ((width - w) // 2, (height - h) // 2, w, h)
-
-
-def _blue_first(frame: Frame) -> NDArray[np.uint8]:
-    """The image of a frame with its channels in the order blue, green, red."""
-    image = np.ascontiguousarray(frame.image).reshape(*frame.image.shape[:2], -1)
-    if frame.encoding != 'rgb8':
-        return image
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2BGR), dtype=np.uint8)
