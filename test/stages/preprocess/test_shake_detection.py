@@ -97,9 +97,10 @@ def filmed(speeds, times=SECOND, **look):
 def test_beads_that_are_shaken_are_found_to_the_frame(before, after):
     grays = filmed(np.where(SECOND <= 1.0, before, after))
     assert onset_frames(grays, SECOND) == [31]
-    # Some streams of x264 show the motion in B frames before it; a cycle has one beginning.
+    # Streams of x264 differ from run to run. Up to three B frames, its default, may show the
+    # motion of the frame that they are made from; a cycle has one beginning.
     first, *later = onset_frames(encoded(grays, 'libx264', crf='23'), SECOND)
-    assert 29 <= first <= 31
+    assert 31 - 3 <= first <= 31
     assert all(frame - first < 15 for frame in later)
 
 
