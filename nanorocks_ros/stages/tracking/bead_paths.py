@@ -1,7 +1,4 @@
-"""Paths of the beads of a tray over the last frames, and how much they bend.
-
-Tested by ``test/stages/tracking/test_camera_motion.py``.
-"""
+"""Paths of the beads of a tray over the last frames, and how much they bend."""
 
 from __future__ import annotations
 
@@ -23,13 +20,33 @@ _GAP_SHARE, _GAP_PX = 0.04, 0.5
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Beads of a frame in the frame of the tray, and the row of each in the frame before."""
+    """Beads of a frame in the frame of the tray, and the row of each in the frames before.
+
+    `links`: ndarray of int32, (frames, n + 1), row of each bead so many frames ago, -1 where it
+    was not seen since; the last column is -1, so that index -1 stays -1.
+    """
 
     time: float
     positions: NDArray[np.float64]
     radii: NDArray[np.float64]
-    before: NDArray[np.int64]
+    links: NDArray[np.int32]
     displacement: NDArray[np.float64]
+
+
+def links_from(before: NDArray[np.int64], links: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Links of a frame, from the row of each bead in the frame before and the links of that.
+
+    Parameters
+    ----------
+    before : ndarray (n,)
+        -1 for a bead that has none.
+    links : ndarray of int32, (frames, m + 1)
+        No frames for the first frame of a recording.
+    """
+    longer = np.full((len(links) + 1, before.size + 1), -1, np.int32)
+    longer[0, :-1] = np.arange(before.size)
+    longer[1:, :-1] = links[:, before]
+    return longer
 
 
 def paths_of(
@@ -37,14 +54,10 @@ def paths_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions some frames ago of the beads seen since then, (lags, n, 2), and their radii."""
     last = moments[-1]
-    rows = [np.arange(len(last.positions))]
-    for k in range(lags[-1]):
-        # A row more for beads that have none: index -1.
-        before = np.append(moments[-1 - k].before, -1)
-        rows.append(before[rows[-1]])
-    seen = rows[-1] >= 0
-    positions = np.stack([moments[-1 - k].positions[rows[k][seen]] for k in lags])
-    return positions, last.radii[seen]
+    seen = last.links[lags[-1], :-1] >= 0
+    rows = [last.links[k, :-1][seen] for k in lags]
+    positions = [moments[-1 - k].positions[chosen] for k, chosen in zip(lags, rows, strict=True)]
+    return np.stack(positions), last.radii[seen]
 
 
 def bend(
@@ -55,6 +68,19 @@ def bend(
 ) -> NDArray[np.float64]:
     """Distance of the later position from where straight motion would have led."""
     return later - middle - ratio * (middle - earlier)
+
+
+@compiled
+def column_medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Median of each column; numpy takes ten times as long for so few values."""
+    half = values.shape[0] // 2
+    medians = np.empty(values.shape[1])
+    for column in range(values.shape[1]):
+        ordered = np.sort(values[:, column])
+        medians[column] = ordered[half]
+        if values.shape[0] % 2 == 0:
+            medians[column] = 0.5 * (ordered[half - 1] + ordered[half])
+    return medians
 
 
 @compiled

@@ -25,6 +25,8 @@ from nanorocks_ros.stages.tracking.bead_paths import (
     Moment,
     bend,
     body_means,
+    column_medians,
+    links_from,
     nearest_rows,
     paths_of,
 )
@@ -132,11 +134,12 @@ class CameraMotion:
         """
         last = self._moments[-1] if self._moments else None
         rows = np.full(len(positions), -1)
-        step = 0.0
+        step, links = 0.0, np.empty((0, 1), np.int32)
         if last is not None:
             nearest_rows(positions, last.positions, rows)
-            step = time - last.time
-        self._moments.append(Moment(time, positions, radii, rows, displacement))
+            step, links = time - last.time, last.links[: len(self._moments)]
+        links = links_from(rows, links)
+        self._moments.append(Moment(time, positions, radii, links, displacement))
         while time - self._moments[0].time > 2.0 * _LAGS[-1] + _MEMORY:
             self._moments.popleft()
         # Compressed pictures that jitter are registered worse than the walls of one of them say.
@@ -215,8 +218,8 @@ class CameraMotion:
 
 def _common_bend(bends: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Median of the bends, and its error."""
-    common = np.median(bends, axis=0)
-    deviation = _DEVIATION * np.median(np.abs(bends - common), axis=0)
+    common = column_medians(bends)
+    deviation = _DEVIATION * column_medians(np.abs(bends - common))
     count = len(bends)
     error = _MEDIAN_ERROR * deviation / math.sqrt(count) * (1.0 + _FEW_BODIES / (count - 1))
     return common, np.hypot(error, _LEAST_ERROR)

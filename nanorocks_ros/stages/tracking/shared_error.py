@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.bead_paths import paths_of
+from nanorocks_ros.numerics.quantiles import median
+from nanorocks_ros.stages.tracking.bead_paths import column_medians, paths_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from nanorocks_ros.stages.tracking.bead_paths import Moment
 
 # Errors that all beads share are measured by the fourth difference of their positions in
@@ -40,7 +39,7 @@ class SharedError:
     """
 
     def __init__(self) -> None:
-        self._differences: deque[tuple[float, NDArray[np.float64]]] = deque()
+        self._differences: deque[tuple[float, float, float]] = deque()
         self.error = 0.0
 
     def push(self, moments: deque[Moment]) -> None:
@@ -56,9 +55,10 @@ class SharedError:
                 positions, radii = paths_of(moments, tuple(range(count)))
                 if len(radii) >= _FEWEST_BEADS:
                     fourth = np.tensordot(_FOURTH, positions, axes=1)
-                    differences.append((times[0], np.abs(np.median(fourth, axis=0))))
+                    across, down = np.abs(column_medians(fourth)).tolist()
+                    differences.append((times[0], across, down))
         self.error = 0.0
         if len(differences) >= _FEWEST_FOURTHS:
             # Median over frames and components: collisions do not count.
-            usual = np.median([difference for _, difference in differences])
-            self.error = _DEVIATION * float(usual) / _FOURTH_ERROR
+            usual = median(size for _, *sizes in differences for size in sizes)
+            self.error = _DEVIATION * usual / _FOURTH_ERROR

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.bead_paths import Moment
+from nanorocks_ros.stages.tracking.bead_paths import Moment, links_from
 from nanorocks_ros.stages.tracking.shared_error import SharedError
 
 BEADS = 40
@@ -23,7 +23,8 @@ def measured(times, shared, speed=30.0, own=0.03):
     for time, offset in zip(times, shared, strict=True):
         positions = start + velocity * time + offset + rng.normal(0.0, own, (BEADS, 2))
         rows = np.arange(BEADS) if moments else np.full(BEADS, -1)
-        moments.append(Moment(time, positions, np.full(BEADS, 4.0), rows, np.zeros(2)))
+        links = links_from(rows, moments[-1].links if moments else np.empty((0, 1), np.int32))
+        moments.append(Moment(time, positions, np.full(BEADS, 4.0), links, np.zeros(2)))
         meter.push(moments)
         errors.append(meter.error)
     return np.array(errors)
