@@ -166,6 +166,29 @@ class ClusterCurve:
             return SizeEstimate(UNKNOWN, UNKNOWN, lower, upper, SizeStatus.BEYOND)
         return SizeEstimate(size, 0.5 * (upper - lower), lower, upper, SizeStatus.MEASURED)
 
+    def excludes(self, reading: float, size: Measured) -> bool:
+        """Whether a size of which something else is sure does not give such a reading.
+
+        Two standard errors of the size and two standard deviations of the reading are allowed.
+
+        Parameters
+        ----------
+        reading : float
+        size : Measured, [beads]
+            Unknown: nothing is excluded.
+        """
+        if not size.known:
+            return False
+        limits = (max(size.value + sign * 2.0 * size.error, 1.0) for sign in (-1.0, 1.0))
+        lower, upper = (
+            float(
+                np.interp(math.log(limit), self.log_size, self.reading)
+                + sign * 2.0 * np.interp(math.log(limit), self.log_size, self.scatter)
+            )
+            for sign, limit in zip((-1.0, 1.0), limits, strict=True)
+        )
+        return not lower <= reading <= upper
+
     def _interval(self, read: float, error: float) -> tuple[float, float]:
         """Smallest and largest size whose mean reading is within one standard deviation.
 

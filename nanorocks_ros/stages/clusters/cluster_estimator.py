@@ -188,12 +188,18 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
         if estimate.size_status not in _WITH_READING:
             return estimate
         reading = offset.curve.reading_of(estimate.level_area, estimate.breadth)
-        if first_merge_ns is None and offset.certainly_single(weighted_size):
+        single = first_merge_ns is None and offset.certainly_single(weighted_size)
+        if single:
             offset.learn(reading, stamp_ns)
         of_camera = offset.known()
         if of_camera is None:
-            disagree = sizes_disagree(estimate.cluster_size, weighted_size)
-            return _contradicted(estimate) if disagree else estimate
+            # Of clusters the tracks are less sure than that all beads are single.
+            wrong = (
+                sizes_disagree(estimate.cluster_size, weighted_size)
+                if single
+                else offset.curve.excludes(reading, weighted_size)
+            )
+            return _contradicted(estimate) if wrong else estimate
         size = offset.curve.size_at(reading, of_camera)
         return replace(
             estimate,

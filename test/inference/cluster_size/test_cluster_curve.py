@@ -14,7 +14,7 @@ from nanorocks_ros.inference.cluster_size.cluster_curve import as_arrays, curve_
 from nanorocks_ros.inference.cluster_size.curve_fit import fit_curve
 from nanorocks_ros.inference.cluster_size.size_from_width import Width
 from nanorocks_ros.outputs.npz_archive import write_archive
-from nanorocks_ros.records import SizeStatus
+from nanorocks_ros.records import Measured, SizeStatus
 
 AREA = 1e-6
 
@@ -71,6 +71,23 @@ def test_a_reading_on_the_flat_part_has_an_interval_up_to_the_largest_size():
     estimate = CURVE.size_of(seen(2.5 * 20.0**0.2 * math.exp(-0.02)))
     assert estimate.status is SizeStatus.MEASURED
     assert estimate.upper == pytest.approx(100.0, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ('size', 'excluded'),
+    [
+        (Measured(3.0, 0.0), False),
+        (Measured(2.3, 0.0), False),
+        (Measured(1.5, 0.0), True),
+        (Measured(1.5, 0.5), False),
+        (Measured(9.0, 0.0), True),
+        (Measured(), False),
+    ],
+)
+def test_a_size_is_excluded_beyond_two_standard_deviations(size, excluded):
+    # 0.06 over a slope of 0.2 is a factor of 1.35.
+    reading = CURVE.reading_of(2.5 * 3.0**0.2 * AREA, 2.5 * 3.0**0.2)
+    assert CURVE.excludes(reading, size) is excluded
 
 
 def test_single_beads_have_size_one_below_the_curve():
