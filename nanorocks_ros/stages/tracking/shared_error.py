@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,8 +51,8 @@ class SharedError:
         count = len(_FOURTH)
         if len(moments) >= count:
             times = [moments[-1 - k].time for k in range(count)]
-            steps = -np.diff(times)
-            if steps.max() < _EVEN * steps.min():
+            steps = [later - earlier for later, earlier in pairwise(times)]
+            if max(steps) < _EVEN * min(steps):
                 positions, radii = paths_of(moments, tuple(range(count)))
                 if len(radii) >= _FEWEST_BEADS:
                     fourth = np.tensordot(_FOURTH, positions, axes=1)
