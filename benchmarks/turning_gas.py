@@ -24,6 +24,9 @@ RATE = 30.0
 # Largest way of the fastest bead in a time step, [m], and the fewest steps per frame.
 _MAX_WAY, _MIN_STEPS = 2e-5, 5
 
+# Most contacts between two frames.
+_MAX_CONTACTS = 1000
+
 # Noise of a place: 0.1 px at 13.5 px/mm, [m]; and of a velocity from about five frames, [m/s].
 _PLACE_ERROR, _VELOCITY_ERROR = 7.4e-6, 7.4e-5
 
@@ -48,10 +51,14 @@ class Gas(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """One frame: tracks, and the body of each bead, (n,)."""
+    """One frame: tracks, the body of each bead, (n,), and the contacts since the last frame.
+
+    Contacts are (m, 2): approach speed along the line of centres, [m/s], and whether it stuck.
+    """
 
     tracks: Tracks
     bodies: np.ndarray
+    contacts: np.ndarray
 
 
 def pictures(tray: Tray, gas: Gas, seed: int, frames: int) -> Iterator[Picture]:
@@ -76,11 +83,17 @@ def pictures(tray: Tray, gas: Gas, seed: int, frames: int) -> Iterator[Picture]:
     momenta, spins = masses[:, None] * velocities, np.zeros_like(places)
     truth = np.array([gas.eps, gas.walls, gas.sticking])
     box = np.array(tray.dimensions)
+    contacts = np.empty((0, 2))
     for frame in range(frames):
-        yield _picture(tray, rng, frame, (species, radii, places, velocities, labels))
+        tracks = _tracks(tray, rng, frame, (species, radii, places, velocities))
+        yield Picture(tracks, labels.copy(), contacts)
         way = np.linalg.norm(velocities, axis=1).max() / RATE
         steps = max(int(np.ceil(way / _MAX_WAY)), _MIN_STEPS)
-        _advance(places, velocities, labels, momenta, spins, masses, radii, box, truth, steps)
+        log = np.empty((_MAX_CONTACTS, 2))
+        count = _advance(
+            places, velocities, labels, momenta, spins, masses, radii, box, truth, steps, log
+        )
+        contacts = log[:count]
 
 
 def _scattered(rng: np.random.Generator, radii: np.ndarray, box: np.ndarray) -> np.ndarray:
@@ -98,13 +111,13 @@ def _scattered(rng: np.random.Generator, radii: np.ndarray, box: np.ndarray) -> 
     return places
 
 
-def _picture(tray: Tray, rng: np.random.Generator, frame: int, state: tuple) -> Picture:
-    species, radii, places, velocities, labels = state
+def _tracks(tray: Tray, rng: np.random.Generator, frame: int, state: tuple) -> Tracks:
+    species, radii, places, velocities = state
     n = radii.size
     gaps = np.hypot(*(places[:, None, :2] - places[None, :, :2]).transpose(2, 0, 1))
     is_below = places[:, None, 2] < places[None, :, 2]
     seen = ~(is_below & (gaps < radii[None, :])).any(axis=1)
-    tracks = Tracks(
+    return Tracks(
         stamp_ns=round(1e9 * frame / RATE),
         tray=tray.number,
         ids=np.arange(n, dtype=np.int32),
@@ -120,7 +133,6 @@ def _picture(tray: Tray, rng: np.random.Generator, frame: int, state: tuple) -> 
         expected=np.array([kind.count for kind in tray.species], dtype=np.int32),
         cycle=1,
     )
-    return Picture(tracks, labels.copy())
 
 
 @numba.njit(cache=True)
@@ -197,8 +209,8 @@ def _meet_walls(places, labels, momenta, spins, radii, box, restitution, bodies)
 
 
 @numba.njit(cache=True)
-def _meet(places, labels, momenta, spins, radii, truth, bodies):
-    """Collide the beads that overlap; the first pair that sticks, or (-1, -1)."""
+def _meet(places, labels, momenta, spins, radii, truth, bodies, log, count):
+    """Collide the beads that overlap; the first pair that sticks, or (-1, -1), and the count."""
     total, centre, inverse = bodies
     for i in range(radii.size):
         for j in range(i + 1, radii.size):
@@ -216,15 +228,19 @@ def _meet(places, labels, momenta, spins, radii, truth, bodies):
             approach = -(velocity * normal).sum()
             if approach <= 0.0:
                 continue
+            if count < len(log):
+                log[count, 0] = approach
+                log[count, 1] = 1.0 if approach < truth[2] else 0.0
+                count += 1
             if approach < truth[2]:
-                return i, j
+                return i, j, count
             size = (1.0 + truth[0]) * approach
             size /= _mobility(a, point, normal, total, centre, inverse) + _mobility(
                 b, point, normal, total, centre, inverse
             )
             _push(b, size * normal, point, momenta, spins, centre)
             _push(a, -size * normal, point, momenta, spins, centre)
-    return -1, -1
+    return -1, -1, count
 
 
 @numba.njit(cache=True)
@@ -243,8 +259,9 @@ def _merge(a, b, labels, momenta, spins, total, centre):
 
 
 @numba.njit(cache=True)
-def _advance(places, velocities, labels, momenta, spins, masses, radii, box, truth, steps):
-    step = 1.0 / (RATE * steps)
+def _advance(places, velocities, labels, momenta, spins, masses, radii, box, truth, steps, log):
+    """Advance by one frame; the number of contacts in the log."""
+    step, count = 1.0 / (RATE * steps), 0
     for _ in range(steps):
         bodies = _centres(places, labels, masses, radii)
         for k in range(masses.size):
@@ -264,8 +281,9 @@ def _advance(places, velocities, labels, momenta, spins, masses, radii, box, tru
         bodies = _centres(places, labels, masses, radii)
         _meet_walls(places, labels, momenta, spins, radii, box, truth[1], bodies)
         while True:
-            i, j = _meet(places, labels, momenta, spins, radii, truth, bodies)
+            i, j, count = _meet(places, labels, momenta, spins, radii, truth, bodies, log, count)
             if i < 0:
                 break
             _merge(labels[i], labels[j], labels, momenta, spins, bodies[0], bodies[1])
             bodies = _centres(places, labels, masses, radii)
+    return count

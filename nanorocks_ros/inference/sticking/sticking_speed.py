@@ -101,7 +101,7 @@ def sticking_estimate_of(
     rate_error : float
         Standard deviation of the logarithm of a common error of all rates.
     probability : float, 0 to 1
-        Of the interval, and of one-sided limits.
+        Of the interval, and of the upper limit without a merge.
     """
     grid, merges = terms.speeds, terms.merges
     if not terms.exposed:
@@ -121,18 +121,21 @@ def _posterior(
     total = np.cumsum(weights)
     total /= total[-1]
     tail = 0.5 * (1.0 - probability)
-    quantiles = (tail, 0.5, 1.0 - tail, probability, 1.0 - probability)
-    low, median, high, limit, least = (float(value) for value in np.interp(quantiles, total, grid))
+    quantiles = (tail, 0.5, 1.0 - tail, probability)
+    low, median, high, limit = (float(value) for value in np.interp(quantiles, total, grid))
+    # What an interval from both sides leaves at either end.
+    drop = 0.5 * NormalDist().inv_cdf(1.0 - tail) ** 2
     if merges == 0:
         status, low, median, high = StickingStatus.NO_MERGE, 0.0, math.nan, limit
-    elif likelihood[-1] > likelihood.max() - _UNLIMITED:
+    elif likelihood[-1] > likelihood.max() - drop:
         # All colliding bodies stuck: any higher speed fits as well.
         # The flat prior up to the highest speed would raise the quantile: the likelihood alone
-        # gives the lower limit, half the square of a normal deviate below its maximum.
-        drop = 0.5 * NormalDist().inv_cdf(probability) ** 2
+        # gives the lower limit, half the square of a normal deviate below its maximum. The
+        # deviate is that of an interval from both sides: whether there is an upper limit is
+        # known from the same merges, which are the more frequent ones if there is none.
         likely = grid[likelihood >= likelihood.max() - drop]
-        least = min(least, float(likely[0]))
-        status, low, median = StickingStatus.NO_UPPER_LIMIT, least, math.nan
+        low = min(low, float(likely[0]))
+        status, median = StickingStatus.NO_UPPER_LIMIT, math.nan
         high = float(grid[-1])
     else:
         status = StickingStatus.MEASURED
@@ -144,10 +147,6 @@ def _posterior(
         merges=merges,
         probability=probability,
     )
-
-
-# With a log likelihood at the highest speed within this of the maximum there is no upper limit.
-_UNLIMITED = 2.0
 
 
 def _nothing(

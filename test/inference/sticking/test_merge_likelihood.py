@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from benchmarks.sticking import true_merges
+from benchmarks.turning_gas import RATE, Gas, pictures
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
@@ -42,7 +44,8 @@ def test_the_likelihood_has_the_integral_of_the_rates_and_their_logarithms_at_th
     decay = cycle(50.0, 20.0, 31.5)
     terms = MergeRates(CONTACTS, BEADS).terms(decay)
     slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / decay.speeds)
-    rates = slower * decay.speeds * 0.5 * decay.bodies**2 / BEADS
+    # Bodies are wider than beads, as the root of their mean size.
+    rates = slower * decay.speeds * 0.5 * decay.bodies**1.5 / BEADS**0.5
     np.testing.assert_allclose(terms.expected, trapezoid(rates, decay.times), rtol=1e-12)
     speeds = np.interp(decay.merges, decay.times, decay.speeds)
     slower = CONTACTS.interpolated_rate_below(terms.speeds[:, np.newaxis] / speeds)
@@ -82,3 +85,30 @@ def test_cycles_add_up_and_a_single_body_does_not_contribute():
     total = first + second + alone
     assert (total.merges, total.exposed) == (1, True)
     np.testing.assert_array_equal(total.expected, first.expected + second.expected)
+
+
+def _turning_cycle(tray, sticking, seed):
+    """A cycle of the independent gas, up to a quarter of the bodies, with its true merges."""
+    rows = []
+    for frame in pictures(tray, Gas(0.89, sticking=sticking), seed, round(20 * RATE)):
+        speed = np.hypot(*frame.tracks.velocities.T).mean()
+        rows.append((frame.tracks.stamp_ns, np.unique(frame.bodies).size, speed))
+        if rows[-1][1] < 0.25 * tray.count:
+            break
+    stamps, bodies, speeds = np.array(rows).T
+    merges = true_merges(stamps / NS, bodies, tray.count)
+    return sticking_cycle(tray.count, merges, stamps[1:].astype(np.int64), speeds[1:], 0)
+
+
+def test_bodies_of_an_independent_gas_merge_as_often_as_expected():
+    tray, sticking = load_trays()[3], 3e-3
+    rates = MergeRates(slow_contacts(tray), tray.count)
+    cycles = [_turning_cycle(tray, sticking, seed) for seed in range(4)]
+    merges, expected = 0, 0.0
+    for cycle in cycles:
+        terms = rates.terms(cycle)
+        merges += terms.merges
+        expected += np.interp(sticking, terms.speeds, terms.expected)
+    assert merges > 150
+    # Two standard deviations; bodies as wide as beads would merge 0.76 times as often.
+    assert expected == pytest.approx(merges, rel=2.0 / np.sqrt(merges))

@@ -9,6 +9,7 @@ import pytest
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.physics.sticking_rates import slow_contacts
@@ -24,11 +25,11 @@ START = 5_000_000_000
 def _cycle(rng, sticking_speed, measure='normal'):
     bodies, merges = np.empty(TIMES.size), []
     left = BEADS
-    rates = CONTACTS.rate_below(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS
+    rates = CONTACTS.rate_below(sticking_speed / SPEEDS, measure) * SPEEDS * 0.5 / BEADS**0.5
     step = TIMES[1]
     for k, rate in enumerate(rates):
         bodies[k] = left
-        if left > 1 and rng.random() < rate * left**2 * step:
+        if left > 1 and rng.random() < rate * left**1.5 * step:
             merges.append(TIMES[k])
             left -= 1
     return StickingCycle(times=TIMES, speeds=SPEEDS, bodies=bodies, merges=np.array(merges))
@@ -97,6 +98,17 @@ def test_if_all_colliding_bodies_stick_there_is_only_a_lower_limit():
     assert estimate.status is StickingStatus.NO_UPPER_LIMIT
     assert estimate.upper == pytest.approx(0.05)
     assert estimate.lower > 3e-3
+
+
+def test_a_lower_limit_alone_leaves_as_much_below_it_as_an_interval():
+    cycle = _cycle(np.random.default_rng(3), 1.0)
+    estimate = sticking_estimate([cycle], CONTACTS, BEADS, rate_error=1e-6)
+    assert estimate.status is StickingStatus.NO_UPPER_LIMIT
+    terms = MergeRates(CONTACTS, BEADS).terms(cycle)
+    logs = terms.logs - terms.expected
+    drop = logs.max() - np.interp(estimate.lower, terms.speeds, logs)
+    # Half the square of the deviate of 97.5 %, within a step of the grid.
+    assert drop == pytest.approx(0.5 * 1.96**2, abs=0.05)
 
 
 def _merge(seconds, joins=True):
