@@ -41,8 +41,8 @@ _CLEARANCE_PX = 2.0
 _MIN_VISIBLE_OUTLINE = 0.5
 # Profiles in a mean from which it is used, and the largest number, beyond which old ones fade.
 _MIN_PROFILES, _MAX_PROFILES = 12.0, 1000.0
-# One frame in so many is averaged, after the first ones.
-_UPDATE_FRAMES = 4
+# One frame in so many is averaged, and the model fitted in one in so many, after the first ones.
+_UPDATE_FRAMES, _FIT_FRAMES, _FIRST_FRAMES = 4, 32, 8
 # Gauss-Newton steps of the model; it starts at the last result.
 _STEPS = 6
 # Limits of the width of the blur and of the distance of an edge from the circle, [px].
@@ -102,10 +102,11 @@ class OutlineProfiles:
         visible_outline : ndarray (m,)
             Of the discs from there on.
         """
-        is_due = self._frame % _UPDATE_FRAMES == 0 or self._frame < _UPDATE_FRAMES
+        frame, is_first = self._frame, self._frame < _FIRST_FRAMES
         self._frame += 1
-        if is_due:
+        if is_first or frame % _UPDATE_FRAMES == 0:
             add_profiles(levels, discs, first, visible_outline, self._means, self._counts)
+        if is_first or frame % _FIT_FRAMES == 0:
             self._correct()
 
     def _correct(self) -> None:
