@@ -27,6 +27,7 @@ ALL = (
     'plate_cost',
     'recorder',
     'foreign_world',
+    'radii',
     'speed_trays',
     'speed_grains',
     'speed_accuracy',

@@ -68,21 +68,33 @@ class _Read:
 
 def report() -> None:
     """Make missing films, measure in all, and print the tables."""
-    drawn = {
-        f'tray_{tray}_{number}': (tray, number)
-        for number in range(int(os.environ.get(COUNT, _FILMS)))
-        for tray in _TRAYS
-    }
+    drawn = {f'tray_{tray}_{number}': (tray, number) for tray, number in _all_drawn()}
     missing = {key: film for key, film in drawn.items() if not _video(*film)}
     with Progress('drawing films') as progress:
         run_tasks(_draw, missing, Workers(), progress.count)
-    print_drawn(_measured([video for film in drawn.values() if (video := _video(*film))]))
-    default = Path(__file__).resolve().parents[2] / 'shared' / 'data' / 'foreign'
-    foreign = sorted(Path(os.environ.get(FOREIGN, default)).glob('*.mp4'))
+    print_drawn(_measured(films_drawn()))
+    foreign = films_by_other_code()
     if foreign:
         print_foreign(_measured(foreign))
     else:
         print(f'\nNo films by other code: set {FOREIGN} to a folder that holds some.')
+
+
+def films_drawn() -> list[Path]:
+    """The drawn films that exist."""
+    return [video for film in _all_drawn() if (video := _video(*film))]
+
+
+def films_by_other_code() -> list[Path]:
+    """The films by other code; none where there is no such folder."""
+    default = Path(__file__).resolve().parents[2] / 'shared' / 'data' / 'foreign'
+    return sorted(Path(os.environ.get(FOREIGN, default)).glob('*.mp4'))
+
+
+def _all_drawn() -> list[tuple[int, int]]:
+    """Tray and number of each drawn film."""
+    numbers = range(int(os.environ.get(COUNT, _FILMS)))
+    return [(tray, number) for number in numbers for tray in _TRAYS]
 
 
 def _stem(tray: int, number: int) -> Path:

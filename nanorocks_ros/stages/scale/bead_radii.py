@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Species, Tray
 
-# Bias of a measured radius by blur, light and noise, as a share of it.
+# Bias of a measured radius by blur, light and noise, as a share: docs/validation/drawn_films.md.
 _RADIUS_BIAS = 0.005
 # Beads alike whose radii scatter by more than this (half the interquartile range) are no circles.
 _LARGEST_SPREAD = 0.04

@@ -12,10 +12,12 @@ from nanorocks_ros.stages.tracking.detection.background_model import (
     initial_background,
     update_background,
 )
+from nanorocks_ros.stages.tracking.detection.bead_edges import CURVATURES, RAYS
 from nanorocks_ros.stages.tracking.detection.circle_fit import refit_circles
 from nanorocks_ros.stages.tracking.detection.disc_scores import DiscSearch
 from nanorocks_ros.stages.tracking.detection.floor_coverage import FloorCoverage
 from nanorocks_ros.stages.tracking.detection.greedy_disc_cover import cover_with_discs
+from nanorocks_ros.stages.tracking.detection.outline_profiles import OutlineProfiles
 from nanorocks_ros.stages.tracking.detection.pixel_classes import (
     BLUE,
     GRAY,
@@ -55,6 +57,9 @@ _MIN_CHALKY_SHARE, _WIDE_SIZE_RANGE = 0.45, 1.5
 _MIN_LIGHT_CHANGE = 0.012
 # Width of the filter that smooths patches of chalk, [px].
 _CHALKY_BLUR_PX = 5
+# Largest level outside the outline of a bead, of 255: of darkness, where a shadow may be another
+# bead, and of coverage, where the floor is visible in a shadow of 60 %.
+_MAX_OUTSIDE_DARKNESS, _MAX_OUTSIDE_COVERAGE = 80.0, 150.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +108,7 @@ class BeadDetector:
             else FloorCoverage(_class_of(species), species.properties.color)
             for species in tray.species
         ]
+        self._profiles = [OutlineProfiles() for _ in tray.species]
         largest = max(species.diameter_high for species in tray.species)
         self._largest_diameter = max(3, round(largest * pixels_per_metre))
         self._frame = 0
@@ -149,6 +155,7 @@ class BeadDetector:
             )
             detections.append(_detections(discs_of_all[first:end], fits))
             first = end
+        self._update_profiles(own_maps, discs_of_all, detections)
         self._update_background(color, maps, self._background)
         self._frame += 1
         return tuple(detections)
@@ -161,6 +168,9 @@ class BeadDetector:
             np.empty(shape, dtype=np.int16),
             np.empty(shape, dtype=np.uint8),
             np.zeros(shape, dtype=np.uint8),
+            np.zeros((2, RAYS)),
+            np.zeros((2, CURVATURES)),
+            _MAX_OUTSIDE_DARKNESS,
         )
         return _Background(mean, _rounded(mean), confirmed, maps)
 
@@ -180,15 +190,35 @@ class BeadDetector:
     ) -> list[PixelMaps]:
         """The maps for each species: edges of a coloured bead are those of its coverage."""
         own = []
-        for coverage in self._coverages:
+        # One lens sees all species.
+        shared = max(self._profiles, key=lambda profiles: profiles.variance)
+        for coverage, profiles in zip(self._coverages, self._profiles, strict=True):
             if coverage is None:
                 own.append(maps)
                 continue
             coverage.update(color, maps.pixel_class)
             own.append(
-                maps._replace(darkness=coverage.map(color, background.levels, maps.darkness))
+                maps._replace(
+                    darkness=coverage.map(color, background.levels, maps.darkness),
+                    shifts=profiles.shifts,
+                    biases=(profiles if profiles.variance else shared).biases,
+                    max_outside=_MAX_OUTSIDE_COVERAGE,
+                )
             )
         return own
+
+    def _update_profiles(
+        self,
+        own_maps: Sequence[PixelMaps],
+        discs: NDArray[np.float64],
+        detections: Sequence[Detections],
+    ) -> None:
+        first = 0
+        for k, beads in enumerate(detections):
+            if self._coverages[k] is not None:
+                levels = own_maps[k].darkness
+                self._profiles[k].update(levels, discs, first, beads.visible_outline)
+            first += len(beads.radii)
 
     def _find_discs(
         self, maps: Sequence[PixelMaps], hints: Sequence[NDArray[np.float64]]

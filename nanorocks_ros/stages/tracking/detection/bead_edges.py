@@ -24,13 +24,15 @@ if TYPE_CHECKING:
 
 RAYS = 32
 """Number of directions in which edges of a bead are searched."""
+MAX_CURVATURE, CURVATURES = 0.5, 33
+"""Largest 1 / radius at which biases by blur are known [1/px], and number of curvatures from 0."""
 EDGE_CLEARANCE_PX = 5.0
 """Smallest distance of an edge from another bead, [px]."""
 
 _ANGLES = 2.0 * np.pi * (np.arange(RAYS) + 0.5) / RAYS
-_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
-# Of 255: largest darkness outside the outline, and smallest step of an edge.
-_MAX_OUTSIDE_DARKNESS = 80.0
+COSINES, SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+"""Directions of the rays."""
+# Smallest step of an edge, of 255.
 _MIN_STEP = 60.0
 # Red minus blue at an edge between two species, in gray levels: smallest step, and largest value
 # outside.
@@ -50,11 +52,16 @@ class EdgeMaps(NamedTuple):
     ----------
     darkness : ndarray of uint8, (pixels,)
     hue : ndarray of int16, (pixels,)
+    shifts, biases, max_outside
+        See `PixelMaps`.
     rows, columns : int
     """
 
     darkness: NDArray[np.uint8]
     hue: NDArray[np.int16]
+    shifts: NDArray[np.float64]
+    biases: NDArray[np.float64]
+    max_outside: float
     rows: int
     columns: int
 
@@ -63,7 +70,32 @@ class EdgeMaps(NamedTuple):
 def edge_maps(pixels: PixelMaps) -> EdgeMaps:
     """Flatten the maps in which edges are searched."""
     rows, columns = pixels.darkness.shape
-    return EdgeMaps(pixels.darkness.reshape(-1), pixels.hue.reshape(-1), rows, columns)
+    return EdgeMaps(
+        pixels.darkness.reshape(-1),
+        pixels.hue.reshape(-1),
+        pixels.shifts,
+        pixels.biases,
+        pixels.max_outside,
+        rows,
+        columns,
+    )
+
+
+def edges_between(profiles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges that `find_edges` finds on profiles, (n,): distances from the middle, [px].
+
+    Parameters
+    ----------
+    profiles : ndarray (n, 2 reach + 1)
+        Levels 1 px apart, from the inside to the outside.
+    """
+    reach = profiles.shape[1] // 2
+    outside = profiles[:, -2:].mean(axis=1, keepdims=True)
+    step = profiles[:, :2].mean(axis=1, keepdims=True) - outside
+    with np.errstate(divide='ignore', invalid='ignore'):
+        shares = np.clip((profiles - outside) / step, 0.0, 1.0)
+    shares[:, 0], shares[:, -1] = 1.0, 0.0
+    return np.asarray(shares.sum(axis=1) - (reach + 0.5))
 
 
 class Rays(NamedTuple):
@@ -119,7 +151,7 @@ def _place_rays(
     columns, rows, hidden = rays.ends[0], rays.ends[1], rays.hidden
     x, y, radius = disc
     for k in range(RAYS):
-        columns[k], rows[k] = x + radius * _COSINES[k], y + radius * _SINES[k]
+        columns[k], rows[k] = x + radius * COSINES[k], y + radius * SINES[k]
         hidden[k] = 0
     for n in range(neighbours):
         hiding_square = rays.neighbours[n, 2]
@@ -130,7 +162,7 @@ def _place_rays(
     for k in range(RAYS):
         # Pixel centres are at halves.
         column, row = columns[k] - 0.5, rows[k] - 0.5
-        column_reach, row_reach = reach * abs(_COSINES[k]), reach * abs(_SINES[k])
+        column_reach, row_reach = reach * abs(COSINES[k]), reach * abs(SINES[k])
         outside_image = (column - column_reach < 0.0) | (row - row_reach < 0.0)
         outside_image |= (column + column_reach + 1.0 >= maps.columns) | (
             row + row_reach + 1.0 >= maps.rows
@@ -163,11 +195,19 @@ def _find_edges(
     for q in range(count):
         ray = np.uint64(rays.active[q])
         samples.starts[0, q], samples.starts[1, q] = rays.ends[0, ray], rays.ends[1, ray]
-        samples.steps[0, q], samples.steps[1, q] = _COSINES[ray], _SINES[ray]
+        samples.steps[0, q], samples.steps[1, q] = COSINES[ray], SINES[ray]
     sample_rays(pixels, width, sign, reach, count, samples)
     find_edges(reach, min_step, max_outside, count, samples)
     for q in range(count):
         rays.edges[rays.active[q]] = samples.edges[q]
+
+
+@inlined
+def _bias_by_blur(biases: NDArray[np.float64], radius: float) -> float:
+    """Distance of the edge from the outline, interpolated over the curvature, [px]."""
+    column = min(1.0 / radius, MAX_CURVATURE) / MAX_CURVATURE * (CURVATURES - 1)
+    left = min(int(column), CURVATURES - 2)
+    return float(biases[left] + (column - left) * (biases[left + 1] - biases[left]))
 
 
 @inlined
@@ -207,8 +247,11 @@ def normal_equations(
     for k in range(RAYS):
         edges[k] = np.nan
     _find_edges(
-        maps.darkness, maps.columns, (1.0, _MIN_STEP, _MAX_OUTSIDE_DARKNESS), reach, stride, rays
+        maps.darkness, maps.columns, (1.0, _MIN_STEP, maps.max_outside), reach, stride, rays
     )
+    bias, shifts = _bias_by_blur(maps.biases[reach - 2], disc[2]), maps.shifts[reach - 2]
+    for k in range(RAYS):
+        edges[k] -= bias + shifts[k]
     if hue_sign != 0.0:
         # Against a bead of another species the hue has a step.
         _find_edges(
@@ -229,7 +272,7 @@ def normal_equations(
         edge, weight = edges[k], weights[k]
         if edge != edge:
             continue
-        c, s = _COSINES[k], _SINES[k]
+        c, s = COSINES[k], SINES[k]
         seen += 1
         total += weight * edge * edge
         side_x += weight * c * edge

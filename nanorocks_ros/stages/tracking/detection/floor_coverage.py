@@ -25,14 +25,18 @@ if TYPE_CHECKING:
 FULL_COVERAGE, NO_COVERAGE = 230, 25
 """Levels of the map for a pixel of the bead and of the floor; noise exceeds both."""
 
-# The line is updated in one frame of so many, with this weight: a time constant of about 1 s.
+# The slope is updated in one frame of so many, with this weight: a time constant of about 1 s.
 _UPDATE_FRAMES, _UPDATE_WEIGHT = 8, 0.3
 # Side of the square by which patches of a species are eroded, which removes blurred edges, [px].
 _EROSION_PX = 5
-# Standard deviation of brightness at which the slope is half that through black, [gray levels].
-_PRIOR_SPREAD = 8.0
-# Deviation from the line, in gray levels, above which a pixel is a highlight or another bead.
-_MAX_DEVIATION = 25.0
+# Quantile of the ratios of dark to bright: highlights and floor only add to the dark channels, in
+# up to half of the pixels of a glossy bead.
+_RATIO_QUANTILE = 0.25
+# Bins of the histogram of ratios from 0 to 1.
+_BINS = 256
+# Brightness below which noise dominates a ratio, and above which a pixel may be saturated,
+# [gray levels].
+_DARKEST, _BRIGHTEST = 40, 250
 # Smallest deviation of the floor from the line, [gray levels]; less is no contrast.
 _MIN_CONTRAST = 30.0
 # Smallest number of pixels from which a line is estimated.
@@ -54,8 +58,8 @@ class FloorCoverage:
         self._bright, self._dark = (2, 0) if kind == RED else (0, 2)
         self._kind = kind
         slope = 0.5 * (color[self._dark] + color[1]) / max(color[self._bright], 1.0)
-        self._line = (min(slope, 1.0), 0.0)
-        self._sums = np.zeros(5)
+        self._slope = min(slope, 1.0)
+        self._histogram = np.zeros(_BINS)
         self._frame = 0
         self._map = np.empty((0, 0), dtype=np.uint8)
 
@@ -73,17 +77,13 @@ class FloorCoverage:
             return
         patches = np.asarray(pixel_class == self._kind, dtype=np.uint8)
         core = cv2.erode(patches, np.ones((_EROSION_PX, _EROSION_PX), dtype=np.uint8))
-        for _ in range(1 if self._sums[0] else 3):
-            limit = _MAX_DEVIATION if self._sums[0] else 2.0 * _MAX_DEVIATION
-            sums = colour_sums(
-                color, np.asarray(core), self._bright, self._dark, self._line, limit
-            )
-            if sums[0] < _MIN_PIXELS:
-                return
-            weight = _UPDATE_WEIGHT if self._sums[0] else 1.0
-            total = self._sums + weight * (sums / sums[0] - self._sums)
-            self._line = _line_of(total)
-        self._sums = total
+        counts = ratio_histogram(color, np.asarray(core), self._bright, self._dark)
+        total = counts.sum()
+        if total < _MIN_PIXELS:
+            return
+        weight = _UPDATE_WEIGHT if self._histogram.any() else 1.0
+        self._histogram += weight * (counts / total - self._histogram)
+        self._slope = _quantile(self._histogram, _RATIO_QUANTILE)
 
     def map(
         self,
@@ -102,31 +102,22 @@ class FloorCoverage:
         if self._map.shape != darkness.shape:
             self._map = np.empty(darkness.shape, dtype=np.uint8)
         write_coverage(
-            color, background, darkness, self._bright, self._dark, self._line, self._map
+            color, background, darkness, self._bright, self._dark, self._slope, self._map
         )
         return self._map
 
 
-def _line_of(means: NDArray[np.float64]) -> tuple[float, float]:
-    """Slope and offset of the dark channels over the bright one; see `colour_sums`."""
-    _, x, y, xx, xy = means
-    prior = _PRIOR_SPREAD * _PRIOR_SPREAD
-    ratio = y / max(x, 1.0)
-    slope = (xy - x * y + prior * ratio) / (max(xx - x * x, 0.0) + prior)
-    slope = min(max(slope, 0.0), 1.0)
-    return float(slope), float(y - slope * x)
+def _quantile(histogram: NDArray[np.float64], share: float) -> float:
+    """Ratio below which a share of a histogram over 0 to 1 lies, interpolated within its bin."""
+    sums = np.concatenate([[0.0], np.cumsum(histogram)])
+    return float(np.interp(share * sums[-1], sums, np.linspace(0.0, 1.0, sums.size)))
 
 
 @compiled
-def colour_sums(
-    color: NDArray[np.uint8],
-    core: NDArray[np.uint8],
-    bright: int,
-    dark: int,
-    line: tuple[float, float],
-    limit: float,
+def ratio_histogram(
+    color: NDArray[np.uint8], core: NDArray[np.uint8], bright: int, dark: int
 ) -> NDArray[np.float64]:
-    """Sums over the pixels near a line: number, bright, dark, bright squared, their product.
+    """Numbers of pixels by the ratio of the dark channels to the bright one, (256,).
 
     Parameters
     ----------
@@ -135,27 +126,16 @@ def colour_sums(
         Nonzero in the pixels that are used.
     bright, dark : int
         Channels in which the species is bright and dark; green counts as dark, too.
-    line : tuple of 2 floats
-        Slope, and offset [gray levels].
-    limit : float, [gray levels]
-        Largest deviation of the mean of the dark channels from the line.
     """
-    sums = np.zeros(5)
-    slope, offset = line
+    counts = np.zeros(_BINS)
     for i in range(core.shape[0]):
         for j in range(core.shape[1]):
-            if not core[i, j]:
-                continue
             x = np.float64(color[i, j, bright])
-            y = 0.5 * (np.float64(color[i, j, dark]) + np.float64(color[i, j, 1]))
-            if abs(y - slope * x - offset) > limit or x >= 250.0:
+            if not core[i, j] or x < _DARKEST or x >= _BRIGHTEST:
                 continue
-            sums[0] += 1.0
-            sums[1] += x
-            sums[2] += y
-            sums[3] += x * x
-            sums[4] += x * y
-    return sums
+            y = 0.5 * (np.float64(color[i, j, dark]) + np.float64(color[i, j, 1]))
+            counts[min(int(_BINS * y / x), _BINS - 1)] += 1.0
+    return counts
 
 
 @compiled
@@ -165,7 +145,7 @@ def write_coverage(
     darkness: NDArray[np.uint8],
     bright: int,
     dark: int,
-    line: tuple[float, float],
+    shade: float,
     coverage: NDArray[np.uint8],
 ) -> None:
     """Write the coverage of the floor, see `FloorCoverage.map`."""
@@ -173,7 +153,7 @@ def write_coverage(
     dark_map, result = darkness.reshape(-1), coverage.reshape(-1)
     three, green = np.uint64(3), np.uint64(1)
     bright_channel, dark_channel = np.uint64(bright), np.uint64(dark)
-    slope, offset = np.float32(line[0]), np.float32(line[1])
+    slope = np.float32(shade)
     half, span = np.float32(0.5), np.float32(FULL_COVERAGE - NO_COVERAGE)
     lowest, highest = np.float32(0.0), np.float32(255.0)
     top, min_contrast = np.float32(FULL_COVERAGE + 0.5), np.float32(_MIN_CONTRAST)
@@ -182,11 +162,11 @@ def write_coverage(
         level = half * (
             np.float32(pixels[three * k + dark_channel]) + np.float32(pixels[three * k + green])
         )
-        level -= slope * np.float32(pixels[three * k + bright_channel]) + offset
+        level -= slope * np.float32(pixels[three * k + bright_channel])
         floor = half * (
             np.float32(empty[three * k + dark_channel]) + np.float32(empty[three * k + green])
         )
-        floor -= slope * np.float32(empty[three * k + bright_channel]) + offset
+        floor -= slope * np.float32(empty[three * k + bright_channel])
         share = top - span * level / max(floor, min_contrast)
         value = np.uint8(min(max(share, lowest), highest))
         result[k] = value if floor > min_contrast else dark_map[k]

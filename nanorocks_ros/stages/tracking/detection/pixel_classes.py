@@ -36,12 +36,21 @@ class PixelMaps(NamedTuple):
         FLOOR to UNKNOWN.
     covered : ndarray of uint8, (rows, columns)
         Bit k is set where a bead of class k was found.
+    shifts : ndarray (2, rays), [px]
+        For edges searched within 2 and 3 px: distance of the edge on each ray from the outline.
+    biases : ndarray (2, curvatures), [px]
+        The same by blur, on a bead of a given curvature; see `edge_biases`.
+    max_outside : float
+        Largest darkness outside the outline: in a map of the coverage shadows are allowed.
     """
 
     darkness: NDArray[np.uint8]
     hue: NDArray[np.int16]
     pixel_class: NDArray[np.uint8]
     covered: NDArray[np.uint8]
+    shifts: NDArray[np.float64]
+    biases: NDArray[np.float64]
+    max_outside: float
 
 
 # Smallest darkness of a pixel of a coloured bead, and of a gray one, in percent from background to
