@@ -15,6 +15,7 @@ from nanorocks_ros.stages.tracking.detection.background_model import (
 from nanorocks_ros.stages.tracking.detection.circle_fit import refit_circles
 from nanorocks_ros.stages.tracking.detection.disc_scores import DiscSearch
 from nanorocks_ros.stages.tracking.detection.floor_coverage import FloorCoverage
+from nanorocks_ros.stages.tracking.detection.gray_threshold import GrayThreshold, covered_share
 from nanorocks_ros.stages.tracking.detection.greedy_disc_cover import cover_with_discs
 from nanorocks_ros.stages.tracking.detection.pixel_classes import (
     BLUE,
@@ -49,6 +50,8 @@ _MAX_COUNT_FACTOR = 1.2
 _BACKGROUND_WEIGHT = 2
 # The same for gray grains: they are many, and fewer radii are tried.
 _GRAY_RADIUS_FACTOR = 1.45
+# Darkness of no pixel, [%].
+_NO_GRAY_PERCENT = 100
 # Smallest visible share of a bead under chalk, if radii differ by more than the factor.
 _MIN_CHALKY_SHARE, _WIDE_SIZE_RANGE = 0.45, 1.5
 # Smallest relative change of the light that is applied to the whole background.
@@ -103,6 +106,9 @@ class BeadDetector:
             else FloorCoverage(_class_of(species), species.properties.color)
             for species in tray.species
         ]
+        gray = [species for species in tray.species if _class_of(species) == GRAY]
+        # Grains in layers hide the floor: what they cover says nothing of their shadows.
+        self._threshold = GrayThreshold(0.0 if self.crowded else covered_share(tray, gray))
         largest = max(species.diameter_high for species in tray.species)
         self._largest_diameter = max(3, round(largest * pixels_per_metre))
         self._frame = 0
@@ -149,6 +155,7 @@ class BeadDetector:
             )
             detections.append(_detections(discs_of_all[first:end], fits))
             first = end
+        self._threshold.update(maps.darkness, maps.pixel_class)
         self._update_background(color, maps, self._background)
         self._frame += 1
         return tuple(detections)
@@ -166,7 +173,8 @@ class BeadDetector:
 
     def _classify(self, color: NDArray[np.uint8], background: _Background) -> PixelMaps:
         maps = background.maps
-        classify_pixels(color, background.levels, self._has_gray, maps)
+        percent = self._threshold.percent if self._has_gray else _NO_GRAY_PERCENT
+        classify_pixels(color, background.levels, percent, maps)
         if self._chalky:
             brighten_dark_hues(color, maps.hue)
             smoothed = cv2.blur(maps.hue, (_CHALKY_BLUR_PX, _CHALKY_BLUR_PX))
@@ -246,7 +254,7 @@ class BeadDetector:
             expected=np.array([0.5 * (low + high), spread]),
             step=max(2 if low >= _COARSE_RADIUS_PX else 1, int(low / _SQUARES_PER_RADIUS)),
             max_beads=0 if crowded else int(_MAX_COUNT_FACTOR * species.count) + 2,
-            background_weight=1 if self._chalky else _BACKGROUND_WEIGHT,
+            background_weight=1 if self._chalky or pixel_class == GRAY else _BACKGROUND_WEIGHT,
             min_share=max(self._settings.min_visible_fraction, min_share),
         )
 
