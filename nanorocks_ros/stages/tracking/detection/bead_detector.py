@@ -46,10 +46,14 @@ _COARSE_RADIUS_PX = 3.0
 _RADIUS_SPREAD_PX = 0.3
 # More beads than expected are searched, so that a wrong number is noticed.
 _MAX_COUNT_FACTOR = 1.2
-# Weight of a background pixel under a disc, over one of the species; 1 under chalk.
+# Weight of a background pixel under a disc, over one of the species; 1 under chalk, and for grains,
+# whose corners and few trial radii leave much floor under a disc.
 _BACKGROUND_WEIGHT = 2
 # The same for gray grains: they are many, and fewer radii are tried.
 _GRAY_RADIUS_FACTOR = 1.45
+# Smallest share of the outline of a gray bead with an edge, which shadows have not: 4 of the 16
+# rays of a small one, since any three edges fit a circle.
+_MIN_GRAY_OUTLINE = 0.2
 # Darkness of no pixel, [%].
 _NO_GRAY_PERCENT = 100
 # Smallest visible share of a bead under chalk, if radii differ by more than the factor.
@@ -190,7 +194,8 @@ class BeadDetector:
         own = []
         for coverage in self._coverages:
             if coverage is None:
-                own.append(maps)
+                edge_levels = maps.edge_levels if self._chalky else self._threshold.edge_levels
+                own.append(maps._replace(edge_levels=edge_levels))
                 continue
             coverage.update(color, maps.pixel_class)
             own.append(
@@ -256,6 +261,7 @@ class BeadDetector:
             max_beads=0 if crowded else int(_MAX_COUNT_FACTOR * species.count) + 2,
             background_weight=1 if self._chalky or pixel_class == GRAY else _BACKGROUND_WEIGHT,
             min_share=max(self._settings.min_visible_fraction, min_share),
+            min_outline=_MIN_GRAY_OUTLINE if pixel_class == GRAY else 0.0,
         )
 
 

@@ -29,9 +29,6 @@ EDGE_CLEARANCE_PX = 5.0
 
 _ANGLES = 2.0 * np.pi * (np.arange(RAYS) + 0.5) / RAYS
 _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
-# Of 255: largest darkness outside the outline, and smallest step of an edge.
-_MAX_OUTSIDE_DARKNESS = 80.0
-_MIN_STEP = 60.0
 # Red minus blue at an edge between two species, in gray levels: smallest step, and largest value
 # outside.
 _MIN_HUE_STEP = 30.0
@@ -51,19 +48,31 @@ class EdgeMaps(NamedTuple):
     darkness : ndarray of uint8, (pixels,)
     hue : ndarray of int16, (pixels,)
     rows, columns : int
+    min_step, max_outside : float
+        See `PixelMaps.edge_levels`.
     """
 
     darkness: NDArray[np.uint8]
     hue: NDArray[np.int16]
     rows: int
     columns: int
+    min_step: float
+    max_outside: float
 
 
 @compiled
 def edge_maps(pixels: PixelMaps) -> EdgeMaps:
     """Flatten the maps in which edges are searched."""
     rows, columns = pixels.darkness.shape
-    return EdgeMaps(pixels.darkness.reshape(-1), pixels.hue.reshape(-1), rows, columns)
+    min_step, max_outside = pixels.edge_levels
+    return EdgeMaps(
+        pixels.darkness.reshape(-1),
+        pixels.hue.reshape(-1),
+        rows,
+        columns,
+        min_step,
+        max_outside,
+    )
 
 
 class Rays(NamedTuple):
@@ -207,7 +216,7 @@ def normal_equations(
     for k in range(RAYS):
         edges[k] = np.nan
     _find_edges(
-        maps.darkness, maps.columns, (1.0, _MIN_STEP, _MAX_OUTSIDE_DARKNESS), reach, stride, rays
+        maps.darkness, maps.columns, (1.0, maps.min_step, maps.max_outside), reach, stride, rays
     )
     if hue_sign != 0.0:
         # Against a bead of another species the hue has a step.

@@ -33,6 +33,9 @@ _LOWEST_PERCENT, _HIGHEST_PERCENT = 30, 58
 # One row in so many is counted in each image; weight of an image: a time constant of 10 images.
 _ROW_STEP, _WEIGHT = 4, 0.1
 _LEVELS = 256
+# Smallest step at an edge: three standard deviations of the mean of two pixels of a noisy sensor
+# (10 gray levels of a floor of 120). Outside, a shadow may be nearly as dark as the threshold.
+_EDGE_STEP, _OUTSIDE_MARGIN = 45.0, 5.0
 
 
 class GrayThreshold:
@@ -49,6 +52,11 @@ class GrayThreshold:
         self._counts = np.zeros(_LEVELS)
         self._frame = 0
         self.percent = DEFAULT_PERCENT
+
+    @property
+    def edge_levels(self) -> tuple[float, float]:
+        """At an edge of a gray bead: see `PixelMaps.edge_levels`."""
+        return _EDGE_STEP, 0.01 * self.percent * (_LEVELS - 1) - _OUTSIDE_MARGIN
 
     def update(self, darkness: NDArray[np.uint8], pixel_class: NDArray[np.uint8]) -> None:
         """Learn from the darkness of an image and the classes of its pixels, (rows, columns)."""
@@ -67,15 +75,25 @@ class GrayThreshold:
         self.percent = min(max(percent, _LOWEST_PERCENT), _HIGHEST_PERCENT)
 
 
-def covered_share(tray: Tray, species: Sequence[Species]) -> float:
-    """Share of the floor that some beads cover when they lie at random, one above the other."""
-    covered = 0.0
-    for beads in species:
-        low, high = beads.diameter_low, beads.diameter_high
-        square = (low * low + low * high + high * high) / 3.0
-        length, width = (side - beads.diameter for side in tray.dimensions[:2])
-        covered += 0.25 * np.pi * square * beads.count / (length * width)
-    return 1.0 - math.exp(-covered)
+def covered_share(tray: Tray, gray: Sequence[Species]) -> float:
+    """Share of the floor that gray beads cover which lie at random, one above the other.
+
+    That of the floor that the other beads leave visible: they fill two thirds of the height of
+    the tray, so that hardly any gray bead lies above or below them.
+    """
+    areas = {
+        species: 0.25 * np.pi * _mean_square_diameter(species) * species.count
+        for species in tray.species
+    }
+    covered = sum(areas[species] for species in gray)
+    free = tray.dimensions[0] * tray.dimensions[1] - sum(areas.values()) + covered
+    return 1.0 - math.exp(-covered / free) if free > 0.0 else 0.0
+
+
+def _mean_square_diameter(species: Species) -> float:
+    """Mean square of diameters that are spread evenly over their range, [m^2]."""
+    low, high = species.diameter_low, species.diameter_high
+    return (low * low + low * high + high * high) / 3.0
 
 
 @compiled

@@ -36,12 +36,15 @@ class PixelMaps(NamedTuple):
         FLOOR to UNKNOWN.
     covered : ndarray of uint8, (rows, columns)
         Bit k is set where a bead of class k was found.
+    edge_levels : tuple of 2 floats
+        At an edge of a bead: smallest step of the darkness, and largest darkness outside.
     """
 
     darkness: NDArray[np.uint8]
     hue: NDArray[np.int16]
     pixel_class: NDArray[np.uint8]
     covered: NDArray[np.uint8]
+    edge_levels: tuple[float, float] = (60.0, 80.0)
 
 
 # Smallest darkness of a pixel of a coloured bead, in percent from background to black.
