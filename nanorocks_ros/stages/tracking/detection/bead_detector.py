@@ -46,8 +46,8 @@ _COARSE_RADIUS_PX = 3.0
 _RADIUS_SPREAD_PX = 0.3
 # More beads than expected are searched, so that a wrong number is noticed.
 _MAX_COUNT_FACTOR = 1.2
-# Weight of a background pixel under a disc, over one of the species; 1 under chalk, and for grains,
-# whose corners and few trial radii leave much floor under a disc.
+# Weight of a background pixel under a disc, over one of the species; 1 under chalk, and for
+# grains, whose corners and few trial radii leave much floor under a disc.
 _BACKGROUND_WEIGHT = 2
 # The same for gray grains: they are many, and fewer radii are tried.
 _GRAY_RADIUS_FACTOR = 1.45
