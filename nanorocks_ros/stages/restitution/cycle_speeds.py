@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# Share of the speeds that are left out where tracks do not tell them well. A decay of some 200
-# speeds does not need them; where they are more, they are a whole part of it.
+# Flags of speeds that tracks do not tell well: they are left out up to this share. A decay of some
+# 200 speeds does not need them; where they are more, they are a whole part of it.
+_DOUBTFUL = Quality.UNCERTAIN | Quality.FEW_BEADS
 _MAX_LEFT_OUT = 0.05
 # Layers of beads up to which the library of decays and the structure function are those of a gas
 # whose pictures show most beads.
@@ -23,14 +24,14 @@ _MAX_LAYERS = 1.0
 
 
 def certain_speeds(speeds: Sequence[SpeedEstimate]) -> list[SpeedEstimate]:
-    """The speeds without those from tracks that are uncertain, if these are few.
+    """The speeds without those from tracks that are uncertain or of few beads, if these are rare.
 
     Parameters
     ----------
     speeds : sequence of SpeedEstimate
         Of one cycle.
     """
-    certain = [speed for speed in speeds if not _is_uncertain(speed)]
+    certain = [speed for speed in speeds if not _is_doubtful(speed)]
     if len(speeds) - len(certain) > _MAX_LEFT_OUT * len(speeds):
         return list(speeds)
     return certain
@@ -57,5 +58,5 @@ def warnings_of(speeds: Sequence[SpeedEstimate], tray: Tray) -> Quality:
     return reduce(or_, flags, Quality(0))
 
 
-def _is_uncertain(speed: SpeedEstimate) -> bool:
-    return speed.method is SpeedMethod.TRACKING and bool(speed.quality & Quality.UNCERTAIN)
+def _is_doubtful(speed: SpeedEstimate) -> bool:
+    return speed.method is SpeedMethod.TRACKING and bool(speed.quality & _DOUBTFUL)

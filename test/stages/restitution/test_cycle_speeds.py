@@ -22,8 +22,14 @@ _SPEED = SpeedEstimate(
 _UNCERTAIN = replace(_SPEED, quality=Quality.UNCERTAIN)
 
 
-def test_a_few_uncertain_speeds_from_tracks_are_left_out():
-    assert certain_speeds([_SPEED] * 96 + [_UNCERTAIN] * 4) == [_SPEED] * 96
+@pytest.mark.parametrize('flag', [Quality.UNCERTAIN, Quality.FEW_BEADS])
+def test_a_few_doubtful_speeds_from_tracks_are_left_out(flag):
+    assert certain_speeds([_SPEED] * 96 + [replace(_SPEED, quality=flag)] * 4) == [_SPEED] * 96
+
+
+def test_other_flags_of_a_single_speed_warn_of_the_cycle():
+    speeds = [_SPEED] * 99 + [replace(_SPEED, quality=Quality.STABILISATION_LOST)]
+    assert warnings_of(certain_speeds(speeds), load_trays()[7]) == Quality.STABILISATION_LOST
 
 
 def test_many_uncertain_speeds_stay_with_their_flag():
