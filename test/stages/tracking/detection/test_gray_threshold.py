@@ -114,7 +114,7 @@ def test_pixels_of_coloured_beads_do_not_count():
     darkness[:, :50], darkness[:, :10] = 250, 130
     classes = np.full(darkness.shape, FLOOR, dtype=np.uint8)
     classes[:, 10:50] = RED
-    threshold = GrayThreshold(0.1)
+    threshold = GrayThreshold(0.2)
     threshold.update(darkness, classes)
     assert threshold.percent < 100.0 * 130 / 255
 
