@@ -57,23 +57,23 @@ class _Camera:
     jpeg: int = 85
     effects: bool = True
     restitution: float = 0.89
-    seed: int = 1
+    seed: int = 101
     scene: dict[str, Any] = field(default_factory=dict)
 
 
 _CALM = {'swing': 0.0}
 _CAMERAS = {
     'no effects': _Camera(effects=False, scene={'noise': 2.0}),
-    'all effects': _Camera(restitution=0.8, seed=2),
-    '8 px/mm': _Camera(scale=8000.0, restitution=0.85, seed=3, scene=_CALM),
-    '20 px/mm': _Camera(scale=20000.0, restitution=0.9, seed=4, scene=_CALM),
-    '60 frames/s': _Camera(rate=60.0, restitution=0.75, seed=5, scene=_CALM),
+    'all effects': _Camera(restitution=0.8, seed=102),
+    '8 px/mm': _Camera(scale=8000.0, restitution=0.85, seed=103, scene=_CALM),
+    '20 px/mm': _Camera(scale=20000.0, restitution=0.9, seed=104, scene=_CALM),
+    '60 frames/s': _Camera(rate=60.0, restitution=0.75, seed=105, scene=_CALM),
     'blur 1.5 px, noise 6': _Camera(
-        restitution=0.93, seed=6, scene={**_CALM, 'defocus_px': 1.5, 'noise': 6.0}
+        restitution=0.93, seed=106, scene={**_CALM, 'defocus_px': 1.5, 'noise': 6.0}
     ),
-    'turning 5 rad/s': _Camera(seed=7, scene={**_CALM, 'turning': 5.0, 'irregularity': 0.25}),
+    'turning 5 rad/s': _Camera(seed=107, scene={**_CALM, 'turning': 5.0, 'irregularity': 0.25}),
     'shadows 0.6, JPEG 60': _Camera(
-        jpeg=60, restitution=0.7, seed=8, scene={**_CALM, 'shadows': 0.6, 'highlights': 2.0}
+        jpeg=60, restitution=0.7, seed=108, scene={**_CALM, 'shadows': 0.6, 'highlights': 2.0}
     ),
 }
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial, reduce
-from operator import or_
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +24,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
+from nanorocks_ros.stages.restitution.cycle_speeds import certain_speeds, warnings_of
 from nanorocks_ros.stages.restitution.restitution_methods import (
     LARGEST_TENSION,
     Decay,
@@ -225,16 +225,17 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
     def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
         if len(self._samples) < self._settings.min_samples:
             return self._undetermined() if status is CorStatus.FINAL else ()
+        samples = certain_speeds(self._samples)
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
-        decay = self._decay(start_ns)
-        quality = reduce(or_, {sample.quality for sample in self._samples}, self._flags)
+        decay = self._decay(samples, start_ns)
+        quality = self._flags | warnings_of(samples, self._tray)
         outcome, result = self._cycle_restitution(decay, quality, status)
         initial_speeds: tuple[Measured, ...] = ()
         haff_times: tuple[Measured, ...] = ()
         if status is CorStatus.FINAL:
             few = self._settings.min_samples
-            initial_speeds, haff_times = species_decays(self._tray, decay.time, self._samples, few)
+            initial_speeds, haff_times = species_decays(self._tray, decay.time, samples, few)
         if result.tension > LARGEST_TENSION:
             quality |= Quality.INCONSISTENT
         return (
@@ -248,7 +249,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
                 initial_speed=result.initial_speed,
                 haff_time=result.haff_time,
                 reduced_chi_square=result.reduced_chi_square,
-                samples=len(self._samples),
+                samples=len(samples),
                 mean_restitution=result.mean_restitution,
                 wall_restitution=result.wall_restitution,
                 correlation=result.correlation,
@@ -266,14 +267,14 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             ),
         )
 
-    def _decay(self, start_ns: int) -> Decay:
+    def _decay(self, samples: list[SpeedEstimate], start_ns: int) -> Decay:
         """The speeds of the cycle, with times since the gas began to cool."""
         return Decay(
-            time=np.array([(sample.stamp_ns - start_ns) / NS for sample in self._samples]),
-            speed=np.array([sample.mean_projected_speed.value for sample in self._samples]),
-            error=np.array([sample.mean_projected_speed.error for sample in self._samples]),
+            time=np.array([(sample.stamp_ns - start_ns) / NS for sample in samples]),
+            speed=np.array([sample.mean_projected_speed.value for sample in samples]),
+            error=np.array([sample.mean_projected_speed.error for sample in samples]),
             of_grains=self._grains
-            and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in self._samples),
+            and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in samples),
         )
 
     def _cycle_restitution(

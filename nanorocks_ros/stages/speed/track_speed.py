@@ -33,9 +33,10 @@ if TYPE_CHECKING:
 
 # Path of a bead in half of the window, at least: jitter is far less.
 _SHORTEST_PATH_PX = 1.5
-# The same where there are grains: as they turn their outlines seem to move, by more than a pixel.
-# Speeds from paths shorter than this share of it are flagged.
-_SHORTEST_GRAIN_PATH_PX = 2.2
+# The same where there are grains: as they turn and hide one another their outlines seem to move,
+# by a share of their radius and by more than a pixel. Speeds from paths shorter than the share
+# below are flagged.
+_SHORTEST_GRAIN_PATH_PX, _SHORTEST_GRAIN_PATH_RADII = 2.2, 0.47
 _LONG_ENOUGH = 0.8
 # Longest window; slower beads rest.
 _LONGEST_WINDOW_NS = 3 * NS
@@ -59,8 +60,7 @@ class TrackSpeed:
     def __init__(self, settings: PipelineSettings, tray: Tray, *, crowded: bool) -> None:
         self._interval_ns = round(settings.speed.interval * NS)
         self._grains = any(species.properties.shape == 'grain' for species in tray.species)
-        path_px = _SHORTEST_GRAIN_PATH_PX if self._grains else _SHORTEST_PATH_PX
-        self._shortest_path = path_px / settings.preprocess.pixels_per_metre
+        self._shortest_path = _shortest_path(tray, settings.preprocess.pixels_per_metre)
         self._tray = tray
         self._crowded = crowded
         self.reset()
@@ -157,3 +157,12 @@ class TrackSpeed:
                 species_speeds=tuple(speeds[:2]),
             ),
         )
+
+
+def _shortest_path(tray: Tray, pixels_per_metre: float) -> float:
+    """Path of a bead in half of the window, at least, [m]."""
+    grains = [species for species in tray.species if species.properties.shape == 'grain']
+    if not grains:
+        return _SHORTEST_PATH_PX / pixels_per_metre
+    radius = 0.5 * max(species.diameter for species in grains)
+    return max(_SHORTEST_GRAIN_PATH_PX / pixels_per_metre, _SHORTEST_GRAIN_PATH_RADII * radius)

@@ -16,6 +16,7 @@ from nanorocks_ros.stages.tracking.detection.bead_edges import CURVATURES, RAYS
 from nanorocks_ros.stages.tracking.detection.circle_fit import refit_circles
 from nanorocks_ros.stages.tracking.detection.disc_scores import DiscSearch
 from nanorocks_ros.stages.tracking.detection.floor_coverage import FloorCoverage
+from nanorocks_ros.stages.tracking.detection.gray_threshold import GrayThreshold, covered_share
 from nanorocks_ros.stages.tracking.detection.greedy_disc_cover import cover_with_discs
 from nanorocks_ros.stages.tracking.detection.outline_profiles import OutlineProfiles
 from nanorocks_ros.stages.tracking.detection.pixel_classes import (
@@ -47,19 +48,25 @@ _COARSE_RADIUS_PX = 3.0
 _RADIUS_SPREAD_PX = 0.3
 # More beads than expected are searched, so that a wrong number is noticed.
 _MAX_COUNT_FACTOR = 1.2
-# Weight of a background pixel under a disc, over one of the species; 1 under chalk.
+# Weight of a background pixel under a disc, over one of the species; 1 under chalk, and for
+# grains, whose corners and few trial radii leave much floor under a disc.
 _BACKGROUND_WEIGHT = 2
 # The same for gray grains: they are many, and fewer radii are tried.
 _GRAY_RADIUS_FACTOR = 1.45
+# Smallest share of the outline of a gray bead with an edge, which shadows have not: 4 of the 16
+# rays of a small one, since any three edges fit a circle.
+_MIN_GRAY_OUTLINE = 0.2
+# Darkness of no pixel, [%].
+_NO_GRAY_PERCENT = 100
 # Smallest visible share of a bead under chalk, if radii differ by more than the factor.
 _MIN_CHALKY_SHARE, _WIDE_SIZE_RANGE = 0.45, 1.5
 # Smallest relative change of the light that is applied to the whole background.
 _MIN_LIGHT_CHANGE = 0.012
 # Width of the filter that smooths patches of chalk, [px].
 _CHALKY_BLUR_PX = 5
-# Largest level outside the outline of a bead, of 255: of darkness, where a shadow may be another
-# bead, and of coverage, where the floor is visible in a shadow of 60 %.
-_MAX_OUTSIDE_DARKNESS, _MAX_OUTSIDE_COVERAGE = 80.0, 150.0
+# Smallest step at the edge of a bead and largest level outside, of 255: of darkness, where a shadow
+# may be another bead, and of coverage, where the floor is visible in a shadow of 60 %.
+_DARKNESS_LEVELS, _COVERAGE_LEVELS = (60.0, 80.0), (60.0, 150.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +116,9 @@ class BeadDetector:
             for species in tray.species
         ]
         self._profiles = [OutlineProfiles() for _ in tray.species]
+        gray = [species for species in tray.species if _class_of(species) == GRAY]
+        # Grains in layers hide the floor: what they cover says nothing of their shadows.
+        self._threshold = GrayThreshold(0.0 if self.crowded else covered_share(tray, gray))
         largest = max(species.diameter_high for species in tray.species)
         self._largest_diameter = max(3, round(largest * pixels_per_metre))
         self._frame = 0
@@ -156,6 +166,7 @@ class BeadDetector:
             detections.append(_detections(discs_of_all[first:end], fits))
             first = end
         self._update_profiles(own_maps, discs_of_all, detections)
+        self._threshold.update(maps.darkness, maps.pixel_class)
         self._update_background(color, maps, self._background)
         self._frame += 1
         return tuple(detections)
@@ -170,13 +181,14 @@ class BeadDetector:
             np.zeros(shape, dtype=np.uint8),
             np.zeros((2, RAYS)),
             np.zeros((2, CURVATURES)),
-            _MAX_OUTSIDE_DARKNESS,
+            _DARKNESS_LEVELS,
         )
         return _Background(mean, _rounded(mean), confirmed, maps)
 
     def _classify(self, color: NDArray[np.uint8], background: _Background) -> PixelMaps:
         maps = background.maps
-        classify_pixels(color, background.levels, self._has_gray, maps)
+        percent = self._threshold.percent if self._has_gray else _NO_GRAY_PERCENT
+        classify_pixels(color, background.levels, percent, maps)
         if self._chalky:
             brighten_dark_hues(color, maps.hue)
             smoothed = cv2.blur(maps.hue, (_CHALKY_BLUR_PX, _CHALKY_BLUR_PX))
@@ -194,7 +206,8 @@ class BeadDetector:
         shared = max(self._profiles, key=lambda profiles: profiles.variance)
         for coverage, profiles in zip(self._coverages, self._profiles, strict=True):
             if coverage is None:
-                own.append(maps)
+                edge_levels = maps.edge_levels if self._chalky else self._threshold.edge_levels
+                own.append(maps._replace(edge_levels=edge_levels))
                 continue
             coverage.update(color, maps.pixel_class)
             own.append(
@@ -202,7 +215,7 @@ class BeadDetector:
                     darkness=coverage.map(color, background.levels, maps.darkness),
                     shifts=profiles.shifts,
                     biases=(profiles if profiles.variance else shared).biases,
-                    max_outside=_MAX_OUTSIDE_COVERAGE,
+                    edge_levels=_COVERAGE_LEVELS,
                 )
             )
         return own
@@ -276,8 +289,9 @@ class BeadDetector:
             expected=np.array([0.5 * (low + high), spread]),
             step=max(2 if low >= _COARSE_RADIUS_PX else 1, int(low / _SQUARES_PER_RADIUS)),
             max_beads=0 if crowded else int(_MAX_COUNT_FACTOR * species.count) + 2,
-            background_weight=1 if self._chalky else _BACKGROUND_WEIGHT,
+            background_weight=1 if self._chalky or pixel_class == GRAY else _BACKGROUND_WEIGHT,
             min_share=max(self._settings.min_visible_fraction, min_share),
+            min_outline=_MIN_GRAY_OUTLINE if pixel_class == GRAY else 0.0,
         )
 
 

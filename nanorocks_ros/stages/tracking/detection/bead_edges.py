@@ -32,8 +32,6 @@ EDGE_CLEARANCE_PX = 5.0
 _ANGLES = 2.0 * np.pi * (np.arange(RAYS) + 0.5) / RAYS
 COSINES, SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 """Directions of the rays."""
-# Smallest step of an edge, of 255.
-_MIN_STEP = 60.0
 # Red minus blue at an edge between two species, in gray levels: smallest step, and largest value
 # outside.
 _MIN_HUE_STEP = 30.0
@@ -52,32 +50,37 @@ class EdgeMaps(NamedTuple):
     ----------
     darkness : ndarray of uint8, (pixels,)
     hue : ndarray of int16, (pixels,)
-    shifts, biases, max_outside
+    shifts, biases
         See `PixelMaps`.
     rows, columns : int
+    min_step, max_outside : float
+        See `PixelMaps.edge_levels`.
     """
 
     darkness: NDArray[np.uint8]
     hue: NDArray[np.int16]
     shifts: NDArray[np.float64]
     biases: NDArray[np.float64]
-    max_outside: float
     rows: int
     columns: int
+    min_step: float
+    max_outside: float
 
 
 @compiled
 def edge_maps(pixels: PixelMaps) -> EdgeMaps:
     """Flatten the maps in which edges are searched."""
     rows, columns = pixels.darkness.shape
+    min_step, max_outside = pixels.edge_levels
     return EdgeMaps(
         pixels.darkness.reshape(-1),
         pixels.hue.reshape(-1),
         pixels.shifts,
         pixels.biases,
-        pixels.max_outside,
         rows,
         columns,
+        min_step,
+        max_outside,
     )
 
 
@@ -247,7 +250,7 @@ def normal_equations(
     for k in range(RAYS):
         edges[k] = np.nan
     _find_edges(
-        maps.darkness, maps.columns, (1.0, _MIN_STEP, maps.max_outside), reach, stride, rays
+        maps.darkness, maps.columns, (1.0, maps.min_step, maps.max_outside), reach, stride, rays
     )
     bias, shifts = _bias_by_blur(maps.biases[reach - 2], disc[2]), maps.shifts[reach - 2]
     for k in range(RAYS):

@@ -42,6 +42,8 @@ class DiscSearch(NamedTuple):
         Weight of a background pixel under a disc, over a pixel of the species.
     min_share : float
         Smallest visible share of the disc of a bead.
+    min_outline : float
+        Smallest share of its outline with an edge.
     """
 
     kind: int
@@ -52,6 +54,7 @@ class DiscSearch(NamedTuple):
     max_beads: int
     background_weight: int
     min_share: float
+    min_outline: float
 
 
 class DiscScores(NamedTuple):

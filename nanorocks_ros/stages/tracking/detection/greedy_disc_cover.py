@@ -128,7 +128,7 @@ def _fit_best_disc(
     fit_circle(maps, search.hue_sign, disc, neighbours, search.expected, fit, rays)
     _remove_from_balance(pixels, search, disc, scores.balance)
     fit[3] = _mark_covered(pixels, search.kind, disc)
-    is_bead = bool(fit[3] >= _MIN_KEPT_SHARE * search.min_share)
+    is_bead = bool((fit[3] >= _MIN_KEPT_SHARE * search.min_share) & (fit[2] >= search.min_outline))
     if not is_bead:
         # The fit moved away: these pixels are no bead and are not tried again.
         _remove_from_balance(pixels, search, guess, scores.balance)
@@ -169,6 +169,8 @@ def _try_hints(
         if dx * dx + dy * dy > (_MAX_HINT_DISTANCE * hint[2]) ** 2:
             continue
         if _uncovered_share(pixels, search.kind, disc) < search.min_share:
+            continue
+        if fits[count, 2] < search.min_outline:
             continue
         fits[count, 3] = _mark_covered(pixels, search.kind, disc)
         count += 1

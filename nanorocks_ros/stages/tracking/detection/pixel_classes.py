@@ -40,8 +40,8 @@ class PixelMaps(NamedTuple):
         For edges searched within 2 and 3 px: distance of the edge on each ray from the outline.
     biases : ndarray (2, curvatures), [px]
         The same by blur, on a bead of a given curvature; see `edge_biases`.
-    max_outside : float
-        Largest darkness outside the outline: in a map of the coverage shadows are allowed.
+    edge_levels : tuple of 2 floats
+        At an edge of a bead: smallest step of the darkness, and largest darkness outside.
     """
 
     darkness: NDArray[np.uint8]
@@ -50,13 +50,11 @@ class PixelMaps(NamedTuple):
     covered: NDArray[np.uint8]
     shifts: NDArray[np.float64]
     biases: NDArray[np.float64]
-    max_outside: float
+    edge_levels: tuple[float, float]
 
 
-# Smallest darkness of a pixel of a coloured bead, and of a gray one, in percent from background to
-# black. Overlapping shadows stay below the second.
+# Smallest darkness of a pixel of a coloured bead, in percent from background to black.
 _DARK_PERCENT = 27
-_GRAY_DARK_PERCENT = 45
 # (red + blue) / (red - blue): copper and acrylic 1.4 to 2, glass -1.4, JSC-1 and floor 10;
 # twice that under chalk.
 _COLOURED = 5
@@ -70,15 +68,16 @@ _SATURATED = 248
 
 @compiled
 def classify_pixels(
-    color: NDArray[np.uint8], background: NDArray[np.uint8], has_gray: bool, maps: PixelMaps
+    color: NDArray[np.uint8], background: NDArray[np.uint8], gray_percent: int, maps: PixelMaps
 ) -> None:
     """Classify the pixels of an image by comparison with the background.
 
     Parameters
     ----------
     color, background : ndarray of uint8, (rows, columns, 3), bgr
-    has_gray : bool
-        Whether the tray has a gray species; without one, dark gray is UNKNOWN.
+    gray_percent : int, [%]
+        Smallest darkness of a pixel of a gray bead, from background to black; 100 without a gray
+        species: dark gray is UNKNOWN then.
     maps : PixelMaps
         Written, except `covered`.
     """
@@ -87,7 +86,7 @@ def classify_pixels(
     pixels, empty = color.reshape(-1), background.reshape(-1)
     darkness, hue = maps.darkness.reshape(-1), maps.hue.reshape(-1)
     pixel_class = maps.pixel_class.reshape(-1)
-    dark_gray = np.uint8(GRAY) if has_gray else np.uint8(UNKNOWN)
+    least_gray = np.int16(gray_percent)
     one, two, three, zero = np.uint64(1), np.uint64(2), np.uint64(3), np.int16(0)
     for pixel in range(pixel_class.size):
         k = np.uint64(pixel)
@@ -113,7 +112,7 @@ def classify_pixels(
         darkness[k] = small_darkness if is_background else scaled_darkness
         depth, light = np.int16(100 * darkening), np.int16(red + blue)
         colour = np.int16(_COLOURED * redness)
-        kind = dark_gray if depth > np.int16(_GRAY_DARK_PERCENT * level) else np.uint8(UNKNOWN)
+        kind = np.uint8(GRAY) if depth > np.int16(least_gray * level) else np.uint8(UNKNOWN)
         kind = np.uint8(BLUE) if np.int16(-colour) > light else kind
         kind = np.uint8(RED) if colour > light else kind
         kind = np.uint8(FLOOR) if depth <= np.int16(_DARK_PERCENT * level) else kind
