@@ -64,8 +64,8 @@ _MIN_CHALKY_SHARE, _WIDE_SIZE_RANGE = 0.45, 1.5
 _MIN_LIGHT_CHANGE = 0.012
 # Width of the filter that smooths patches of chalk, [px].
 _CHALKY_BLUR_PX = 5
-# Smallest step at the edge of a bead and largest level outside, of 255: of darkness, where a shadow
-# may be another bead, and of coverage, where the floor is visible in a shadow of 60 %.
+# Smallest step at the edge of a bead and largest level outside, of 255: of darkness, where a
+# shadow may be another bead, and of coverage, where the floor shows in a shadow of 60 %.
 _DARKNESS_LEVELS, _COVERAGE_LEVELS = (60.0, 80.0), (60.0, 150.0)
 
 
