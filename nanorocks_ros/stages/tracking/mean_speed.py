@@ -17,6 +17,7 @@ import numpy as np
 from nanorocks_ros.stages.tracking.displacements import (
     ALL_SPECIES,
     MinDisplacement,
+    PlaceNoise,
     TrackSeries,
     displacements_beyond_noise,
     join_tracks,
@@ -37,10 +38,11 @@ sometimes wrong by more than 20 %."""
 _NS = 1e9
 # Smallest displacement over the error of a coordinate: the noise then adds 2 % to the mean square.
 _MIN_NOISE_RATIO = 14.0
-# The same for errors that positions share for some time, such as those from patches of chalk; and
-# the part of it below which a speed is unreliable.
-_MIN_ERROR_RATIO = 4.0
-_RELIABLE_FACTOR = 0.8
+# The same for errors that change along the path. What they add to the mean square, 4 / 64, is
+# subtracted; errors known within a factor of 1.5 leave some 3 % of the speed. And the ratio below
+# which a speed is unreliable.
+_MIN_ERROR_RATIO = 8.0
+_RELIABLE_RATIO = 3.2
 # Relative error of the mean over the share of lost beads: fast beads are lost more often. At
 # 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
 _LOSS_BIAS = 0.4
@@ -69,6 +71,8 @@ class MeanSpeed:
     reliable : bool
         Whether enough beads have tracks (where many are lost, others are linked wrongly), and
         displacements exceed the position errors.
+    beyond_errors : bool
+        Whether displacements exceed the position errors.
     """
 
     stamp_ns: int
@@ -78,6 +82,7 @@ class MeanSpeed:
     beads: int
     share: float
     reliable: bool
+    beyond_errors: bool
 
 
 def mean_speed(
@@ -108,18 +113,23 @@ def mean_speeds(
     """Mean speeds of several species of the same tracks; None stands for all beads."""
     if not tracks:
         return [None for _ in species]
+    recent = join_tracks(tracks[-NOISE_FRAMES:])
     return mean_speeds_of_series(
         join_tracks(tracks),
-        join_tracks(tracks[-NOISE_FRAMES:]),
+        [_frame_noise(recent, index, tracks[-1].expected.size) for index in species],
         tracks[-1].expected,
         least_distance=least_distance,
         species=species,
     )
 
 
+def _frame_noise(recent: TrackSeries, index: int | None, count: int) -> PlaceNoise:
+    return PlaceNoise.of(position_noise(recent, ALL_SPECIES if index is None else index), count)
+
+
 def mean_speeds_of_series(
     series: TrackSeries,
-    recent: TrackSeries,
+    noises: Sequence[PlaceNoise],
     expected: NDArray[np.int32],
     *,
     least_distance: float,
@@ -130,8 +140,8 @@ def mean_speeds_of_series(
     Parameters
     ----------
     series : TrackSeries
-    recent : TrackSeries
-        The last `NOISE_FRAMES` of them.
+    noises : sequence of PlaceNoise
+        For each of the species.
     expected : ndarray of int32, (species,)
         Number of beads in the tray.
     least_distance, species
@@ -140,24 +150,22 @@ def mean_speeds_of_series(
     return [
         _mean_speed(
             series,
-            recent,
+            noise,
             least_distance,
             ALL_SPECIES if index is None else index,
             int(expected.sum() if index is None else expected[index]),
         )
-        for index in species
+        for index, noise in zip(species, noises, strict=True)
     ]
 
 
 def _mean_speed(
-    series: TrackSeries, recent: TrackSeries, least_distance: float, species: int, expected: int
+    series: TrackSeries, noise: PlaceNoise, least_distance: float, species: int, expected: int
 ) -> MeanSpeed | None:
     minimum = MinDisplacement(
         least_distance * least_distance, _MIN_NOISE_RATIO**2, _MIN_ERROR_RATIO**2, _MIN_BEADS
     )
-    lag, distance_rows, *means = displacements_beyond_noise(
-        series, species, position_noise(recent, species), minimum
-    )
+    lag, distance_rows, *means = displacements_beyond_noise(series, species, noise, minimum)
     if not lag:
         return None
     distances = _Distances(*distance_rows, *means)
@@ -175,6 +183,7 @@ def _mean_speed(
         beads=distances.whole_window.size,
         share=share,
         reliable=share >= RELIABLE_SHARE and distances.exceed_errors(),
+        beyond_errors=distances.exceed_errors(),
     )
 
 
@@ -194,7 +203,7 @@ class _Distances:
 
     def exceed_errors(self) -> bool:
         """Whether displacements exceed the position errors, such as those from rotating chalk."""
-        return self.square >= (_RELIABLE_FACTOR * _MIN_ERROR_RATIO) ** 2 * self.position_variance
+        return self.square >= _RELIABLE_RATIO**2 * self.position_variance
 
     def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
         half = 0.5 * (

@@ -67,7 +67,7 @@ def write_snapshot(
     n_tracks: int,
     time: float,
     walls: Walls,
-    systematic: float,
+    scaling: tuple[float, float],
     collisions: tuple[float, float],
     species: int,
     snapshot: TrackSnapshot,
@@ -80,8 +80,9 @@ def write_snapshot(
     tracks, n_tracks, time
         See `append_detections`.
     walls : Walls
-    systematic : float, [px]
-        Error that all positions of a bead share.
+    scaling : tuple of 2 floats
+        Error of a seen position over that of its fit; and an error that all positions of a bead
+        share, [px].
     collisions : tuple of 2 floats, [1/s], [px/s]
         Collision rate of a bead, and standard deviation of its change of velocity.
     species : int
@@ -94,6 +95,7 @@ def write_snapshot(
         Row after the last one.
     """
     rate, velocity_change = collisions
+    factor, systematic = scaling
     row = first
     for k in range(n_tracks):
         if tracks.hits[k] < CONFIRM_FRAMES:
@@ -102,7 +104,7 @@ def write_snapshot(
         seen = tracks.last_seen[k] == time
         if seen:
             x, y = tracks.positions[k, 0, 0], tracks.positions[k, 0, 1]
-            error = tracks.errors[k, 0]
+            error = factor * tracks.errors[k, 0]
         else:
             # Unseen collisions, uniformly distributed in time.
             dt = time - tracks.last_seen[k]
