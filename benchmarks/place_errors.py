@@ -39,7 +39,7 @@ class PlaceErrors:
         True error of a coordinate, from the median of absolute values; and the part of it that
         differs between frames.
     place_ratio, radius_ratio : float
-        Median of the stated errors over the true one. Of radii: without their common bias.
+        Median of the stated errors over the true one.
     """
 
     true: float
@@ -122,8 +122,7 @@ def _errors_of(
     second = (errors[2:] - 2.0 * errors[1:-1] + errors[:-2])[same]
     true = _DEVIATION * float(np.median(np.abs(errors)))
     last = np.append(pairs[1:, 1] != pairs[:-1, 1], True)
-    radii = pairs[last, 8] - np.median(pairs[last, 8])
-    of_radii = _DEVIATION * float(np.median(np.abs(radii)))
+    of_radii = _DEVIATION * float(np.median(np.abs(pairs[last, 8])))
     return PlaceErrors(
         true=true,
         white=_DEVIATION * float(np.median(np.abs(second))) / float(np.sqrt(6.0)),

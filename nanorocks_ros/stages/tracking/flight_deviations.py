@@ -34,14 +34,17 @@ _KEPT, _FEWEST, _EVERY = 512, 48, 24
 _ROUNDS = 30
 # Smallest ratio of the variances of deflected and straight paths: closer ones are one kind.
 _LEAST_CONTRAST = 4.0
-# Smallest share of straight paths.
-_FEWEST_STRAIGHT = 0.4
-# Length over which errors from light and outline are alike, in radii. Up to it deviations may grow
-# at any rate; beyond it they saturate, where those from many slight kicks, which a heavy bead gets
-# from light ones, double with the path. Largest growth beyond, as a power of the path: the middle
-# between that of independent steps, 1/2, and that of kinks, 1.
-_ALIKE_RADII = 0.5
+# Smallest share of straight paths: with fewer, slight kicks pass for errors.
+_FEWEST_STRAIGHT = 0.5
+
+# Largest growth of the deviations, as a power of the path: the middle between that of errors that
+# change in independent steps, 1/2, and that of kinks, 1, such as the many slight ones that a heavy
+# bead gets from light ones. Longer paths than those that grow faster tell nothing.
 _MOST_GROWTH = 0.75
+# Longest half of the shortest path, [px]: over longer ones alone, as of fast beads in a film of few
+# frames, errors cannot be told from slight kicks. Up to it errors may grow at any rate: those from
+# the pixel grid are alike below.
+_FIRST_PX = 2.0
 # Longest half of a path in radii: the length next to it is used.
 _LONGEST_RADII = math.sqrt(2.0)
 # Decile of an exponential variable over half of its mean.
@@ -97,8 +100,8 @@ class FlightDeviations:
         self._remaining = assumed if hidden else 0.0
         used = np.array(PATHS_PX) <= _LONGEST_RADII * radius_px
         count = max(int(used.sum()), 1)
-        self._alike = _ALIKE_RADII * pixel * radius_px
         self._lengths = pixel * np.array(PATHS_PX)[:count]
+        self._first = pixel * _FIRST_PX
         self._paths = _Paths(
             np.full(_SLOTS, -1, dtype=np.int64),
             np.zeros((_SLOTS, count), dtype=np.int64),
@@ -149,13 +152,13 @@ class FlightDeviations:
             self._lengths.tolist(), self._paths.variances.tolist(), strict=True
         ):
             if math.isnan(variance):
-                if known:
+                if known or length >= self._first:
                     break
                 continue
             factor = math.sqrt(variance)
             if known:
                 shorter, last = known[-1]
-                if length > self._alike and factor > last * (length / shorter) ** _MOST_GROWTH:
+                if length > self._first and factor > last * (length / shorter) ** _MOST_GROWTH:
                     break
                 # Errors over a longer path are not smaller: that is chance.
                 factor = max(factor, last)

@@ -121,8 +121,10 @@ def write_snapshot(
             snapshot.velocities[row, axis] = line[3 + axis] if has_velocity else np.nan
         snapshot.velocity_errors[row] = math.sqrt(line[6]) if has_velocity else np.nan
         snapshot.radii[row] = tracks.radii[k]
+        # Residuals above the stated errors inflate that of the mean.
+        inflation = max(tracks.radius_squares[k] / max(tracks.hits[k] - 1, 1), 1.0)
         snapshot.radius_errors[row] = math.sqrt(
-            1.0 / tracks.radius_weights[k] + MIN_RADIUS_VARIANCE
+            inflation / tracks.independent_weights[k] + MIN_RADIUS_VARIANCE
         )
         row += 1
     return row
