@@ -20,8 +20,6 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.preprocess.difference_noise import NS
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
-from nanorocks_ros.stages.tracking.displacement_errors import DisplacementErrors
-from nanorocks_ros.stages.tracking.displacements import ALL_SPECIES
 from nanorocks_ros.stages.tracking.mean_speed import (
     NOISE_FRAMES,
     RELIABLE_SHARE,
@@ -62,8 +60,7 @@ class TrackSpeed:
         self._interval_ns = round(settings.speed.interval * NS)
         self._grains = any(species.properties.shape == 'grain' for species in tray.species)
         path_px = _SHORTEST_GRAIN_PATH_PX if self._grains else _SHORTEST_PATH_PX
-        self._scale = settings.preprocess.pixels_per_metre
-        self._shortest_path = path_px / self._scale
+        self._shortest_path = path_px / settings.preprocess.pixels_per_metre
         self._tray = tray
         self._crowded = crowded
         self.reset()
@@ -73,7 +70,6 @@ class TrackSpeed:
         del stamp_ns
         self.reliability = TrackReliability(self._tray, crowded=self._crowded)
         self._recent = TrackWindow()
-        self._errors = DisplacementErrors(self._tray, self._scale)
         self._next_ns: int | None = None
         self._last_ns: int | None = None
         self._flags = Quality(0)
@@ -94,7 +90,6 @@ class TrackSpeed:
         # The tracker knows whether tray and camera can be told apart.
         self._flags |= record.quality & Quality.STABILISATION_LOST
         self._recent.push(record, record.stamp_ns - _LONGEST_WINDOW_NS)
-        self._errors.push(record)
         self.reliability.push(record)
         if self._next_ns is not None and record.stamp_ns < self._next_ns:
             return ()
@@ -117,13 +112,12 @@ class TrackSpeed:
 
     def _speeds(self, tracks: Tracks) -> tuple[SpeedEstimate, ...]:
         series = self._recent.series()
-        recent, kinds = self._recent.series(NOISE_FRAMES), range(len(self._tray.species))
         mean, *of_species = mean_speeds_of_series(
             series,
-            [self._errors.noise(recent, kind) for kind in (ALL_SPECIES, *kinds)],
+            self._recent.series(NOISE_FRAMES),
             tracks.expected,
             least_distance=self._shortest_path,
-            species=(None, *kinds),
+            species=(None, *range(len(self._tray.species))),
         )
         if mean is None or not np.isfinite(mean.mean_projected_speed):
             return ()

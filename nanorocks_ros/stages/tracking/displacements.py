@@ -55,29 +55,6 @@ class TrackSeries(NamedTuple):
     errors: NDArray[np.float64]
 
 
-class PlaceNoise(NamedTuple):
-    """How much the errors of the places at the ends of a path differ.
-
-    Parameters
-    ----------
-    between_frames : float, [m^2]
-        Variance of a coordinate between successive frames, at least.
-    lengths : ndarray (species, lengths), [m]
-        Lengths of paths, ascending; 0 before the first known one.
-    shares : ndarray (species, lengths)
-        Variance of what differs over these paths, over the stated variance.
-    """
-
-    between_frames: float
-    lengths: NDArray[np.float64]
-    shares: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, between_frames: float, species: int) -> PlaceNoise:
-        """Noise of which only that between frames is known."""
-        return cls(between_frames, np.zeros((species, 1)), np.zeros((species, 1)))
-
-
 class MinDisplacement(NamedTuple):
     """Smallest mean square displacement of the beads in half of a window.
 
@@ -209,7 +186,7 @@ def _distance(series: TrackSeries, row: int, other: int) -> float:
 
 @compiled
 def displacements_between(
-    series: TrackSeries, frames: tuple[int, int, int], species: int, noise: PlaceNoise
+    series: TrackSeries, frames: tuple[int, int, int], species: int, noise: float
 ) -> tuple[NDArray[np.float64], float, float, float]:
     """Distances that each bead moved between three frames in which it is visible.
 
@@ -220,8 +197,8 @@ def displacements_between(
         Later, middle, earlier.
     species : int
         Index of the species, or ALL.
-    noise : PlaceNoise
-        Errors that both ends of a path share do not displace a bead.
+    noise : float, [m^2]
+        Upper limit of the variances: errors that frames share do not displace a bead.
 
     Returns
     -------
@@ -231,7 +208,7 @@ def displacements_between(
     square : float, [m^2]
         Mean square of the first two; NaN without beads, like the others.
     variance : float, [m^2]
-        Mean variance of a coordinate, as far as it differs between the ends of the paths.
+        Mean variance of a coordinate, as far as it differs between frames.
     position_variance : float, [m^2]
         Median of the whole variance of a coordinate.
     """
@@ -251,7 +228,7 @@ def displacements_between(
 def _write_distances(
     series: TrackSeries,
     rows: NDArray[np.int64],
-    noise: PlaceNoise,
+    noise: float,
     distances: NDArray[np.float64],
     variances: NDArray[np.float64],
 ) -> tuple[float, float]:
@@ -266,30 +243,13 @@ def _write_distances(
         for frame in range(3):
             total += series.errors[rows[frame, k]] ** 2
         variances[k] = total / 3.0
-        path = 0.5 * (distances[0, k] + distances[1, k])
-        differing = variances[k] * _share(noise, series.species[rows[0, k]], path)
-        variance += max(differing, min(variances[k], noise.between_frames))
+        variance += min(variances[k], noise)
     return square, variance
-
-
-@inlined
-def _share(noise: PlaceNoise, species: int, path: float) -> float:
-    """Share of a variance that differs between the ends of a path."""
-    lengths, shares = noise.lengths[species], noise.shares[species]
-    known, share = 0.0, 0.0
-    for k in range(lengths.size):
-        if path >= lengths[k]:
-            known, share = lengths[k], shares[k]
-            continue
-        # In proportion to the path, between the lengths and from none to the first.
-        slope = (shares[k] - share) / (lengths[k] - known)
-        return float(share + slope * (path - known))
-    return float(share)
 
 
 @compiled
 def displacements_beyond_noise(
-    series: TrackSeries, species: int, noise: PlaceNoise, minimum: MinDisplacement
+    series: TrackSeries, species: int, noise: float, minimum: MinDisplacement
 ) -> tuple[int, NDArray[np.float64], float, float, float]:
     """Distances over the shortest lag at which displacements exceed the noise, or the longest lag.
 
@@ -321,9 +281,8 @@ def displacements_beyond_noise(
             break
         lag, distances = new_lag, new_distances
         square, variance, position_variance = new_square, new_variance, new_position_variance
-        jitter = min(noise.between_frames, position_variance)
         noise_square = max(
-            minimum.variances * jitter, minimum.position_variances * position_variance
+            minimum.variances * variance, minimum.position_variances * position_variance
         )
         if square >= max(minimum.square, noise_square):
             break

@@ -17,7 +17,6 @@ import numpy as np
 from nanorocks_ros.stages.tracking.displacements import (
     ALL_SPECIES,
     MinDisplacement,
-    PlaceNoise,
     TrackSeries,
     displacements_beyond_noise,
     join_tracks,
@@ -38,10 +37,10 @@ sometimes wrong by more than 20 %."""
 _NS = 1e9
 # Smallest displacement over the error of a coordinate: the noise then adds 2 % to the mean square.
 _MIN_NOISE_RATIO = 14.0
-# The same for errors that change along the path. What they add to the mean square, 4 / 64, is
-# subtracted; errors known within a factor of 1.5 leave some 3 % of the speed. And the ratio below
-# which a speed is unreliable.
-_MIN_ERROR_RATIO = 8.0
+# The same for all errors, which positions share for some time, such as those from patches of
+# chalk. Errors s that the ends of a path do not share make a speed from distances d in half and
+# whole windows 7/4 s^2 / d^2 too high: 1.8 %. And the ratio below which a speed is unreliable.
+_MIN_ERROR_RATIO = 10.0
 _RELIABLE_RATIO = 3.2
 # Relative error of the mean over the share of lost beads: fast beads are lost more often. At
 # 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
@@ -113,23 +112,18 @@ def mean_speeds(
     """Mean speeds of several species of the same tracks; None stands for all beads."""
     if not tracks:
         return [None for _ in species]
-    recent = join_tracks(tracks[-NOISE_FRAMES:])
     return mean_speeds_of_series(
         join_tracks(tracks),
-        [_frame_noise(recent, index, tracks[-1].expected.size) for index in species],
+        join_tracks(tracks[-NOISE_FRAMES:]),
         tracks[-1].expected,
         least_distance=least_distance,
         species=species,
     )
 
 
-def _frame_noise(recent: TrackSeries, index: int | None, count: int) -> PlaceNoise:
-    return PlaceNoise.of(position_noise(recent, ALL_SPECIES if index is None else index), count)
-
-
 def mean_speeds_of_series(
     series: TrackSeries,
-    noises: Sequence[PlaceNoise],
+    recent: TrackSeries,
     expected: NDArray[np.int32],
     *,
     least_distance: float,
@@ -140,8 +134,8 @@ def mean_speeds_of_series(
     Parameters
     ----------
     series : TrackSeries
-    noises : sequence of PlaceNoise
-        For each of the species.
+    recent : TrackSeries
+        The last `NOISE_FRAMES` of them.
     expected : ndarray of int32, (species,)
         Number of beads in the tray.
     least_distance, species
@@ -150,22 +144,24 @@ def mean_speeds_of_series(
     return [
         _mean_speed(
             series,
-            noise,
+            recent,
             least_distance,
             ALL_SPECIES if index is None else index,
             int(expected.sum() if index is None else expected[index]),
         )
-        for index, noise in zip(species, noises, strict=True)
+        for index in species
     ]
 
 
 def _mean_speed(
-    series: TrackSeries, noise: PlaceNoise, least_distance: float, species: int, expected: int
+    series: TrackSeries, recent: TrackSeries, least_distance: float, species: int, expected: int
 ) -> MeanSpeed | None:
     minimum = MinDisplacement(
         least_distance * least_distance, _MIN_NOISE_RATIO**2, _MIN_ERROR_RATIO**2, _MIN_BEADS
     )
-    lag, distance_rows, *means = displacements_beyond_noise(series, species, noise, minimum)
+    lag, distance_rows, *means = displacements_beyond_noise(
+        series, species, position_noise(recent, species), minimum
+    )
     if not lag:
         return None
     distances = _Distances(*distance_rows, *means)

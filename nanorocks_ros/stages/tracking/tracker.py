@@ -12,7 +12,7 @@ from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.stage import RestartingStage
 from nanorocks_ros.stages.tracking.camera_motion import CameraMotion
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
-from nanorocks_ros.stages.tracking.flight_deviations import FlightDeviations
+from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviations
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.linking.track_snapshot import (
     allocate_snapshot,

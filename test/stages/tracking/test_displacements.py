@@ -10,7 +10,6 @@ import pytest
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.stages.tracking.displacements import (
     ALL_SPECIES,
-    PlaceNoise,
     displacements_between,
     join_tracks,
     position_noise,
@@ -59,7 +58,7 @@ def test_displacements_are_of_the_beads_visible_in_all_three_frames(species):
         earlier, middle, later = (_usable(record, species) for record in tracks)
         common = sorted(earlier.keys() & middle.keys() & later.keys())
         distances, square, variance, position_variance = displacements_between(
-            join_tracks(tracks), (2, 1, 0), species, PlaceNoise.of(3e-12, 2)
+            join_tracks(tracks), (2, 1, 0), species, 3e-12
         )
         assert distances.shape == (3, len(common))
         if not common:

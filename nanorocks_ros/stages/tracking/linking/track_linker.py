@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
-    from nanorocks_ros.stages.tracking.flight_deviations import FlightDeviations
+    from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviations
 
 # Rate of unseen collisions of a bead, [1/s].
 _COLLISION_RATE = 5.0

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.flight_deviations import FlightDeviations, straight_variance
+from nanorocks_ros.stages.tracking.linking.flight_deviations import (
+    FlightDeviations,
+    straight_variance,
+)
 
 BEADS = 30
 RATE = 30.0

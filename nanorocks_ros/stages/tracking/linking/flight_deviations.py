@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
+from nanorocks_ros.stages.tracking.linking.track_store import ALIKE_RADII
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-PATHS_PX = (1.0, 2.0, 4.0, 8.0, 16.0)
-"""Lengths of half a path, each twice the one before, [px]."""
-
-# Longest half of a path over its nominal length: where a bead moves further between two frames
-# the deviation belongs to a longer path.
-_LONGEST = 2.0
+# Lengths of half a path, each twice the one before, [px].
+_PATHS_PX = (1.0, 2.0, 4.0, 8.0, 16.0)
+# Longest half of a path over its nominal length, half way to the next one: where a bead moves
+# further between two frames the deviation belongs to a longer path.
+_LONGEST = math.sqrt(2.0)
 # Longest ratio of the times of the two halves.
 _EVEN = 1.5
 # Tracks with room; numbers of tracks ascend, so that two of one remainder hardly live together.
@@ -41,12 +41,15 @@ _FEWEST_STRAIGHT = 0.5
 # change in independent steps, 1/2, and that of kinks, 1, such as the many slight ones that a heavy
 # bead gets from light ones. Longer paths than those that grow faster tell nothing.
 _MOST_GROWTH = 0.75
-# Longest half of the shortest path, [px]: over longer ones alone, as of fast beads in a film of few
-# frames, errors cannot be told from slight kicks. Up to it errors may grow at any rate: those from
-# the pixel grid are alike below.
+# Longest half of the shortest path, [px]: over longer ones alone, as of fast beads in a film of
+# few frames, errors cannot be told from slight kicks. Up to it errors may grow at any rate: those
+# from the pixel grid are alike below.
 _FIRST_PX = 2.0
 # Longest half of a path in radii: the length next to it is used.
 _LONGEST_RADII = math.sqrt(2.0)
+# Smallest share of the variance of errors along a path that its deviations show and that is made
+# up for; with less, chance would be.
+_LEAST_SEEN = 0.5
 # Decile of an exponential variable over half of its mean.
 _DECILE = 0.2107
 
@@ -85,23 +88,19 @@ class FlightDeviations:
     ----------
     radius_px : float, [px]
         Of a bead. Paths are about as long: few beads fly straight much further in a dense tray.
-    pixel : float
-        Length of a pixel in the unit of the places.
-    assumed : float
-        Error that all places of a bead share, in their unit, until flights tell the errors.
+    assumed : float, [px]
+        Error that all places of a bead share, until flights tell the errors.
     hidden : bool
         Whether that error is never seen in flights, as that of chalk that turns with a bead.
     """
 
-    def __init__(
-        self, radius_px: float, pixel: float = 1.0, *, assumed: float = 0.0, hidden: bool = False
-    ) -> None:
+    def __init__(self, radius_px: float, *, assumed: float = 0.0, hidden: bool = False) -> None:
         self._assumed = assumed
         self._remaining = assumed if hidden else 0.0
-        used = np.array(PATHS_PX) <= _LONGEST_RADII * radius_px
+        used = np.array(_PATHS_PX) <= _LONGEST_RADII * radius_px
         count = max(int(used.sum()), 1)
-        self._lengths = pixel * np.array(PATHS_PX)[:count]
-        self._first = pixel * _FIRST_PX
+        self._lengths = np.array(_PATHS_PX)[:count]
+        self._alike = ALIKE_RADII * radius_px
         self._paths = _Paths(
             np.full(_SLOTS, -1, dtype=np.int64),
             np.zeros((_SLOTS, count), dtype=np.int64),
@@ -125,9 +124,9 @@ class FlightDeviations:
         time : float, [s]
         ids : ndarray of int32, (n,)
             Numbers of their tracks.
-        places : ndarray (n, 2)
+        places : ndarray (n, 2), [px]
             In a frame in which free beads fly straight.
-        errors : ndarray (n,)
+        errors : ndarray (n,), [px]
             Stated errors of a coordinate.
         """
         _push(self._paths, self._lengths, time, ids, places, errors)
@@ -136,7 +135,14 @@ class FlightDeviations:
     def scaling(self) -> tuple[float, float]:
         """True error of a place: over the stated one, and what is added to it in squares."""
         known = self.known()
-        return (known[-1][1], self._remaining) if known else (1.0, self._assumed)
+        if not known:
+            return 1.0, self._assumed
+        length, factor = known[-1]
+        white = known[0][1] ** 2
+        # Errors over a longer path would differ more: correlations fall off exponentially.
+        kept = math.exp(-length / self._alike)
+        seen = max(1.0 - (4.0 * kept - kept * kept) / 3.0, _LEAST_SEEN)
+        return math.sqrt(white + (factor * factor - white) / seen), self._remaining
 
     def known(self) -> list[tuple[float, float]]:
         """Errors over paths of ascending lengths.
@@ -144,7 +150,7 @@ class FlightDeviations:
         Returns
         -------
         list of tuples of 2 floats
-            Length of half a path, in the unit of the places, and by how much the errors at its
+            Length of half a path, [px], and by how much the errors at its
             ends differ, over the stated errors. As far as errors, not kinks, explain it.
         """
         known: list[tuple[float, float]] = []
@@ -152,13 +158,13 @@ class FlightDeviations:
             self._lengths.tolist(), self._paths.variances.tolist(), strict=True
         ):
             if math.isnan(variance):
-                if known or length >= self._first:
+                if known or length >= _FIRST_PX:
                     break
                 continue
             factor = math.sqrt(variance)
             if known:
                 shorter, last = known[-1]
-                if length > self._first and factor > last * (length / shorter) ** _MOST_GROWTH:
+                if length > _FIRST_PX and factor > last * (length / shorter) ** _MOST_GROWTH:
                     break
                 # Errors over a longer path are not smaller: that is chance.
                 factor = max(factor, last)
