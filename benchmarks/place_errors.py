@@ -53,8 +53,9 @@ def place_errors(
 ) -> tuple[PlaceErrors | None, ...]:
     """Compare errors in each species; None where too few beads are found.
 
-    What a common offset, the scale and the perspective displace is not counted: they are linear
-    in the place and in its product with the height.
+    What the scale and the perspective displace is not counted: they are linear in the place and
+    in its product with the height. Nor is what displaces all beads of a frame alike, such as
+    a sway of the camera: it changes no distance.
     """
     count = int(film.species.max()) + 1
     rows: list[list[NDArray[np.float64]]] = [[] for _ in range(count)]
@@ -70,9 +71,13 @@ def place_errors(
     pairs = [np.concatenate(parts) if parts else np.empty((0, 11)) for parts in rows]
     if sum(map(len, pairs)) < _FEWEST:
         return (None,) * count
-    offsets = _offsets(np.concatenate(pairs))
+    together = np.concatenate(pairs)
+    together[:, 4:6] -= _design(together) @ _offsets(together)
+    _remove_common(together)
+    ends = np.cumsum([len(part) for part in pairs])
     return tuple(
-        _errors_of(part, offsets, film.scale) if len(part) >= _FEWEST else None for part in pairs
+        _errors_of(part, film.scale) if len(part) >= _FEWEST else None
+        for part in np.split(together, ends[:-1])
     )
 
 
@@ -112,12 +117,18 @@ def _offsets(pairs: NDArray[np.float64]) -> NDArray[np.float64]:
     return coefficients
 
 
-def _errors_of(
-    pairs: NDArray[np.float64], offsets: NDArray[np.float64], scale: float
-) -> PlaceErrors:
+def _remove_common(pairs: NDArray[np.float64]) -> None:
+    """Subtract the median error of each frame."""
+    order = np.argsort(pairs[:, 0], kind='stable')
+    starts = np.flatnonzero(np.diff(pairs[order, 0], prepend=-1.0))
+    for rows in np.split(order, starts[1:]):
+        pairs[rows, 4:6] -= np.median(pairs[rows, 4:6], axis=0)
+
+
+def _errors_of(pairs: NDArray[np.float64], scale: float) -> PlaceErrors:
     order = np.lexsort((pairs[:, 0], pairs[:, 1]))
     pairs = pairs[order]
-    errors = scale * (pairs[:, 4:6] - _design(pairs) @ offsets)
+    errors = scale * pairs[:, 4:6]
     same = (pairs[2:, 1] == pairs[:-2, 1]) & (pairs[2:, 0] - pairs[:-2, 0] == 2)
     second = (errors[2:] - 2.0 * errors[1:-1] + errors[:-2])[same]
     true = _DEVIATION * float(np.median(np.abs(errors)))
