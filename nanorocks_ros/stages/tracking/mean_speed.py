@@ -39,8 +39,9 @@ _NS = 1e9
 _MIN_NOISE_RATIO = 14.0
 # The same for all errors, which positions share for some time, such as those from patches of
 # chalk. Errors s that the ends of a path do not share make a speed from distances d in half and
-# whole windows 7/4 s^2 / d^2 too high: 1.8 %. And the ratio below which a speed is unreliable.
-_MIN_ERROR_RATIO = 10.0
+# whole windows 7/4 s^2 / d^2 too high: 2.7 %; longer paths lose as much by collisions. And the
+# ratio below which a speed is unreliable.
+_MIN_ERROR_RATIO = 8.0
 _RELIABLE_RATIO = 3.2
 # Relative error of the mean over the share of lost beads: fast beads are lost more often. At
 # 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
