@@ -217,9 +217,7 @@ class _Distances:
             0.5 * math.sqrt(_mean(bead_scatter * bead_scatter)) / math.sqrt(self.whole_window.size)
         )
         shared_error = self._shared_share() * half
-        error = math.hypot(
-            noise_error * per_time, 0.5 * shortened, 0.8 * scatter, 0.5 * shared_error
-        )
+        error = math.hypot(noise_error * per_time, 0.5 * shortened, scatter, shared_error)
         return max(half + shortened, 0.0), error
 
     def _shared_share(self) -> float:
