@@ -26,8 +26,7 @@ def within(ratios, factor):
     return bool(np.all(np.abs(np.log(ratios)) <= np.log(factor)))
 
 
-# Of the error at once: acrylic as stated by a constant of the simulated camera was 1.6 to 2.2
-# times too large here.
+# Errors from a constant of the simulated camera were 1.8 to 2.2 times too large here.
 @pytest.mark.parametrize('name', ['a1_89_99', 'p3a'])
 def test_errors_are_as_stated_in_a_film_by_other_code(name):
     assert within(place_ratios(foreign_film(name)), FACTOR)
