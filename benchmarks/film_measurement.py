@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.place_errors import PlaceErrors, place_errors
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
@@ -68,6 +69,8 @@ class FilmResult:
         Of each species: beads seen over true beads, mean over frames.
     radii : tuple of float
         Of each species: median of the measured radii over the mean true one.
+    errors : tuple of PlaceErrors or None
+        Of each species: stated errors of places and radii over the true ones.
     """
 
     refusal: str = ''
@@ -78,6 +81,7 @@ class FilmResult:
     flagged_speeds: float = 0.0
     counts: tuple[float, ...] = ()
     radii: tuple[float, ...] = ()
+    errors: tuple[PlaceErrors | None, ...] = ()
 
     @property
     def final(self) -> CorEstimate | None:
@@ -149,6 +153,7 @@ class _Reading:
             flagged_speeds=self._flagged(speeds, epoch_ns),
             counts=self._counts(),
             radii=self._radii(epoch_ns),
+            errors=place_errors(self._film, self._tracks, epoch_ns),
         )
 
     def _keep(self, records: Iterable[Result], notices: list[str]) -> None:
