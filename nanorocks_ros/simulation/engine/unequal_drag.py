@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.numerics.exponentials import decayed
-from nanorocks_ros.simulation.engine.gas_drag import drag_rate, flown
+from nanorocks_ros.simulation.engine.gas_drag import drag_rate
 from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS
 from nanorocks_ros.simulation.engine.pair_times import is_rounding, minimum_image
 
@@ -89,15 +89,47 @@ def wait_with_unequal_drag(
             minimum_image(rules, 1, start[1]),
             minimum_image(rules, 2, start[2]),
         )
-    rates = drag_rate(state, i), drag_rate(state, j)
-    reach = state.rows[i, RADIUS] + state.rows[j, RADIUS]
+    return wait_of_flights(
+        start,
+        (flights[1], flights[3]),
+        (drag_rate(state, i), drag_rate(state, j)),
+        (state.rows[i, RADIUS] + state.rows[j, RADIUS], rules.contact_duration),
+        (now, limit),
+    )
+
+
+@compiled
+def wait_of_flights(
+    start: Vector,
+    velocities: tuple[Vector, Vector],
+    rates: tuple[float, float],
+    contact: tuple[float, float],
+    times: tuple[float, float],
+) -> float:
+    """Time until two beads of bent paths touch, as `wait_with_unequal_drag`, [s].
+
+    Parameters
+    ----------
+    start : tuple of 3 floats, [m]
+        From the first bead to the second.
+    velocities : tuple of 2 vectors, [m/s]
+    rates : tuple of 2 floats, [1/s]
+    contact : tuple of 2 floats, [m], [s]
+        Distance at the contact, and contact duration.
+    times : tuple of 2 floats, [s]
+        Now, and the limit.
+    """
+    reach, duration = contact
+    now, limit = times
     time = 0.0
     for _ in range(_MOST_STEPS):
-        u = scaled(flights[1], decayed(rates[0] * time)[1])
-        v = scaled(flights[3], decayed(rates[1] * time)[1])
-        path = difference(
-            scaled(flights[3], flown(rates[1], time)), scaled(flights[1], flown(rates[0], time))
-        )
+        gone, left = decayed(rates[0] * time)
+        u = scaled(velocities[0], left)
+        first = scaled(velocities[0], gone / rates[0] if rates[0] > 0.0 else time)
+        gone, left = decayed(rates[1] * time)
+        v = scaled(velocities[1], left)
+        second = scaled(velocities[1], gone / rates[1] if rates[1] > 0.0 else time)
+        path = difference(second, first)
         apart = start[0] + path[0], start[1] + path[1], start[2] + path[2]
         square = product(apart, apart)
         approach = product(apart, difference(v, u))
@@ -110,7 +142,7 @@ def wait_with_unequal_drag(
             if not is_rounding(approach, square, squares[0], squares[1]):
                 return time - max(gap, 0.0) / opening
             # Beads that rest against each other: drag needs time to move them.
-            step = max(step, rules.contact_duration)
+            step = max(step, duration)
         else:
             speeds = math.sqrt(squares[0]), math.sqrt(squares[1])
             if gap * rates[0] * rates[1] > rates[1] * speeds[0] + rates[0] * speeds[1]:
