@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gases import BOX, KERNELS, RULES, energy, gas_of, mixture, near
+from gases import BOX, KERNELS, RULES, energy, gas_of, mixture, near, smallest_gap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from stepped_gas import SteppedGas
@@ -119,6 +119,22 @@ def test_small_steps_in_time_give_the_same_gas(kernel, tangential, rates):
     assert after.velocities == pytest.approx(slow.v, abs=1e-7)
     if tangential is not None:
         assert after.spins == pytest.approx(slow.spins, abs=1e-7)
+
+
+@pytest.mark.parametrize('name', RULES)
+def test_scan_and_lists_give_the_same_gas_of_unequal_drag_under_every_rule(name):
+    rules = CollisionRules(box=BOX, **RULES[name])
+    beads = mixture(21, 12, rules)
+    beads = replace(beads, drag=np.linspace(0.0, 0.4, 12))
+    times = np.linspace(0.0, 6.0, 61)
+    scan, lists = (
+        HardSphereGas(beads, rules, kernel).follow(6.0, times, log=True) for kernel in KERNELS
+    )
+    assert scan.events.size == lists.events.size > 5
+    assert scan.positions == pytest.approx(lists.positions, abs=1e-6)
+    assert scan.velocities == pytest.approx(lists.velocities, abs=1e-6)
+    if rules.motion is None:
+        assert smallest_gap(scan.positions, beads.radii, rules) > -1e-9
 
 
 def test_drag_of_0_is_no_drag_bit_by_bit():
