@@ -63,6 +63,14 @@ class SimulationSettings:
     wall_friction: float = setting(
         1e6, 'coefficient of friction of rough beads at the walls', low=0.0, high=1e6
     )
+    drag: float = setting(
+        0.0,
+        'rate at which a gas slows a bead of mean size of the first species of a tray; Stokes: '
+        'others by 1 / (density diameter²), spins 10/3 times as fast; 0: vacuum',
+        '1/s',
+        low=0.0,
+        high=100.0,
+    )
     speeds: str = setting(
         'uniform',
         'speed distribution after a shaking event: uniform in [0, 2 mean], Maxwellian, or from a '

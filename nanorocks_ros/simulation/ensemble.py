@@ -23,9 +23,11 @@ from nanorocks_ros.simulation.engine.rules.collision_rules import restitution_ta
 from nanorocks_ros.simulation.initial_state import (
     draw_diameters,
     draw_velocities,
+    gas_viscosity,
     inventory,
     resting_beads,
     rules_of,
+    set_drag,
     sphere_masses,
 )
 from nanorocks_ros.simulation.packing.random_placement import MOST_TRIES, pack_beads
@@ -156,6 +158,8 @@ def _small_run(
         ranges,
         drawn.species,
         keys,
+        np.zeros((drawn.density.size, 2) if settings.drag > 0.0 else 0),
+        gas_viscosity(settings, tray),
         settings.mean_speed,
         settings.speeds == 'maxwellian',
         settings.vertical_speed_factor,
@@ -183,6 +187,8 @@ def _cool(
     ranges: NDArray[np.float64],
     species: NDArray[np.int32],
     keys: NDArray[np.uint64],
+    drag: NDArray[np.float64],
+    viscosity: float,
     mean_speed: float,
     maxwell: bool,
     vertical: float,
@@ -198,8 +204,9 @@ def _cool(
     if placed < n:
         return _NO_ROOM
     masses = sphere_masses(diameters, ranges[2])
+    set_drag(drag, diameters, ranges[2], viscosity)
     velocities = draw_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
-    state = new_state(positions, velocities, radii, masses, species, rules)
+    state = new_state(positions, velocities, radii, masses, species, drag, rules)
     nothing = np.empty((0, 0, 3))
     output = RunOutput(
         times[:0],

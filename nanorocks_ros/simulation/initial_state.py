@@ -11,6 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for, uniform
+from nanorocks_ros.physics.stokes_drag import stokes_rate, viscosity_of
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.input_checks import check_room
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
@@ -154,13 +155,44 @@ def resting_beads(settings: SimulationSettings, tray: Tray, run: int = 0) -> Bea
     check_room(0.5 * diameters, rules)
     places_key = key_for(settings.seed, run, Purpose.POSITIONS)
     positions = random_positions(0.5 * diameters, tray.dimensions, key=places_key)
+    rates = np.zeros(diameters.size)
+    set_drag(rates, diameters, drawn.density, gas_viscosity(settings, tray))
     return Beads(
         radii=0.5 * diameters,
         masses=sphere_masses(diameters, drawn.density),
         positions=positions,
         velocities=np.zeros((diameters.size, 3)),
         species=drawn.species,
+        drag=rates if settings.drag > 0.0 else None,
     )
+
+
+def gas_viscosity(settings: SimulationSettings, tray: Tray) -> float:
+    """Viscosity of a gas that drags the first species of a tray as set, [Pa s]."""
+    first = tray.species[0]
+    return viscosity_of(settings.drag, first.density, first.diameter)
+
+
+@compiled
+def set_drag(
+    rates: NDArray[np.float64],
+    diameters: NDArray[np.float64],
+    density: NDArray[np.float64],
+    viscosity: float,
+) -> None:
+    """Set the rates at which a gas slows spheres, [1/s].
+
+    Parameters
+    ----------
+    rates : ndarray (n,) or (n, columns) or (0,)
+        Written; equal columns.
+    diameters, density : ndarray (n,), [m], [kg/m^3]
+    viscosity : float, [Pa s]
+    """
+    columns = rates.size // diameters.size
+    for k in range(rates.size):
+        i = k // columns
+        rates.flat[k] = stokes_rate(viscosity, density[i], diameters[i])
 
 
 @compiled

@@ -100,6 +100,11 @@ class ShakenTray:
         return self._gas.radii
 
     @property
+    def drag(self) -> NDArray[np.float64]:
+        """Rate at which the gas slows each bead, (n,), [1/s]; 0 in a vacuum."""
+        return np.zeros(self.radii.size) if self._gas.drag is None else self._gas.drag
+
+    @property
     def cycle(self) -> int:
         """Shaking events so far."""
         return self._cycle

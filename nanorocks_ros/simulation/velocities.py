@@ -1,9 +1,8 @@
 """Random velocities: after shaking, or Maxwellian.
 
-Normal deviates come from Marsaglia's polar method with a logarithm of our own. The usual ones
-call `log` and `cos`, whose last bits differ from one mathematical library to the next; this
-one needs ``+ - * /`` and square roots, so that velocities are the same bits on every machine,
-and unlike a sum of uniform numbers it has the right tails.
+Normal deviates come from Marsaglia's polar method with a logarithm of our own, see
+`exponentials`: velocities are the same bits on every machine, and unlike a sum of uniform numbers
+they have the right tails.
 
 References
 ----------
@@ -19,17 +18,13 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import direction, hashed, uniform
+from nanorocks_ros.numerics.exponentials import logarithm
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Deviation of each component of a Maxwellian gas of mean speed 1.
 _DEVIATION = math.sqrt(math.pi / 8.0)
-
-_LOG_2 = 0.6931471805599453
-_SQRT_HALF = math.sqrt(0.5)
-# Terms of the series of the logarithm: the next one is below 3e-18 of the sum.
-_TERMS = 11
 
 
 @compiled
@@ -123,22 +118,3 @@ def normal_pair(key: np.uint64, counter: int) -> tuple[float, float, int]:
         if 0.0 < square < 1.0:
             stretch = math.sqrt(-2.0 * logarithm(square) / square)
             return a * stretch, b * stretch, counter
-
-
-@compiled
-def logarithm(x: float) -> float:
-    """Natural logarithm of a number in (0, 1), the same bits on every machine.
-
-    Halves are taken out until the rest m is near 1; then log m = 2 artanh z with
-    z = (m - 1)/(m + 1), whose series in z^2 < 0.03 is summed.
-    """
-    halves = 0
-    while x < _SQRT_HALF:
-        x *= 2.0
-        halves += 1
-    z = (x - 1.0) / (x + 1.0)
-    square = z * z
-    total = 0.0
-    for k in range(_TERMS - 1, -1, -1):
-        total = total * square + 1.0 / (2 * k + 1)
-    return 2.0 * z * total - halves * _LOG_2

@@ -42,6 +42,17 @@ def test_diameters_are_even_over_the_range_and_masses_those_of_spheres():
     np.testing.assert_allclose(beads.masses, 1180.0 * math.pi / 6.0 * diameters**3, rtol=1e-14)
 
 
+def test_the_drag_of_each_bead_is_that_of_the_first_species_by_density_and_size():
+    tray = load_trays()[3]
+    beads = resting_beads(replace(SETTINGS, drag=0.02), tray)
+    acrylic_beads, glass = tray.species
+    assert beads.drag[:15] == pytest.approx(0.02, rel=1e-12)
+    scale = acrylic_beads.density / glass.density * (1e-3 / beads.radii[15:]) ** 2
+    assert beads.drag[15:] == pytest.approx(0.02 * scale, rel=1e-12)
+    assert beads.drag[15:].mean() == pytest.approx(0.036, rel=0.1)
+    assert resting_beads(SETTINGS, tray).drag is None
+
+
 def test_speeds_after_a_shake_are_even_from_zero_to_twice_the_mean():
     key = key_for(1, 0, Purpose.VELOCITIES)
     velocities = uniform_speeds(20_000, 0.007, key, 0)

@@ -9,10 +9,12 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from small_gases import smallest_gap
 
 from nanorocks_ros.errors import ConfigurationError, SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 
@@ -111,10 +113,12 @@ def test_settings_out_of_range_are_all_named():
         ShakenTray(settings, TRAY)
 
 
-def test_an_ensemble_run_is_the_run_of_a_shaken_tray():
-    settings = replace(SETTINGS, first_shake=0.0, shake_period=3600.0)
-    runs = cooling_runs(settings, TRAY, [0.0, 1.0, 20.0], [3])
-    shaken = ShakenTray(settings, TRAY, run=3)
+@pytest.mark.parametrize(('number', 'drag'), [(1, 0.0), (1, 0.07), (3, 0.07)])
+def test_an_ensemble_run_is_the_run_of_a_shaken_tray(number, drag):
+    settings = replace(SETTINGS, first_shake=0.0, shake_period=3600.0, drag=drag)
+    tray = load_trays()[number]
+    runs = cooling_runs(settings, tray, [0.0, 1.0, 20.0], [3])
+    shaken = ShakenTray(settings, tray, run=3)
     for k, time in enumerate(runs.times):
         _, v = shaken.at(time)
         expected = np.linalg.norm(v, axis=1).mean()
@@ -138,6 +142,32 @@ def test_the_mean_speed_of_tray_1_falls_as_in_the_prototype():
         assert np.all(difference < 4.0 * math.sqrt(2.0) * error)
     assert runs.pair_collisions.mean() == pytest.approx(280, rel=0.03)
     assert runs.wall_collisions.mean() == pytest.approx(885, rel=0.03)
+
+
+def test_a_tray_in_a_gas_cools_as_in_a_vacuum_in_another_clock():
+    rate = 0.07
+    times = np.array([0.0, 1.0, 2.0, 4.0])
+    clock = -np.expm1(-rate * times) / rate
+    dragged = cooling_runs(replace(SETTINGS, drag=rate), TRAY, times, range(4))
+    free = cooling_runs(SETTINGS, TRAY, clock, range(4))
+    assert dragged.mean_speed == pytest.approx(np.exp(-rate * times) * free.mean_speed, rel=1e-6)
+    np.testing.assert_array_equal(dragged.pair_collisions, free.pair_collisions)
+    np.testing.assert_array_equal(dragged.wall_collisions, free.wall_collisions)
+
+
+def test_shaken_walls_and_walls_that_swing_meet_dragged_beads():
+    settings = replace(SETTINGS, drag=0.5, speeds='shaken', first_shake=0.0, shake_period=5.0)
+    swing = WallMotion(
+        amplitude=(2e-4, 1e-4, 0.0), angular_frequency=20.0, damping=0.5, end=10.0 * math.pi / 20.0
+    )
+    shaken = ShakenTray(settings, TRAY, swing=swing)
+    first = np.linalg.norm(shaken.at(0.0)[1], axis=1).mean()
+    assert first == pytest.approx(settings.mean_speed, rel=1e-12)
+    positions, velocities = shaken.at(4.9)
+    # 4.9 s at 0.5 /s, besides the losses in collisions.
+    assert np.linalg.norm(velocities, axis=1).mean() < math.exp(-2.0) * first
+    assert smallest_gap(positions, shaken.radii) > -1e-12
+    assert np.array_equal(shaken.drag, np.full(15, 0.5))
 
 
 def test_ensembles_that_cannot_be_run_are_refused():

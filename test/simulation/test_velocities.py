@@ -7,17 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy import stats
 
 from nanorocks_ros.numerics.counter_rng import Purpose, direction, hashed, key_for, uniform
-from nanorocks_ros.simulation.velocities import (
-    logarithm,
-    maxwellian,
-    normal_pair,
-    uniform_speeds,
-)
+from nanorocks_ros.simulation.velocities import maxwellian, normal_pair, uniform_speeds
 
 KEY = key_for(1, 0, Purpose.VELOCITIES)
 N = 200_000
@@ -102,17 +95,6 @@ def test_velocities_are_the_same_bits_on_every_machine():
     assert (
         hashlib.sha256(velocities.astype('<f8').tobytes()).hexdigest()[:16] == 'aa35a0fcf188f740'
     )
-
-
-@given(st.floats(0.0, 1.0, exclude_min=True, exclude_max=True))
-@settings(deadline=None, max_examples=500)
-def test_our_logarithm_is_right_to_three_units_in_the_last_place(x):
-    assert logarithm(x) == pytest.approx(math.log(x), rel=0.0, abs=3.0 * math.ulp(math.log(x)))
-
-
-def test_it_is_right_next_to_one_and_next_to_the_halvings():
-    for x in (1.0 - 2.0**-53, math.sqrt(0.5), math.nextafter(math.sqrt(0.5), 0.0), 2.0**-104):
-        assert logarithm(x) == pytest.approx(math.log(x), rel=4e-16)
 
 
 def test_normal_numbers_come_in_pairs_and_say_where_to_go_on():

@@ -109,7 +109,7 @@ def beads_of(positions, velocities, *, radii=1.0, masses=1.0, **more):
 
 def gas_of(positions, velocities, *, kernel=Kernel.AUTOMATIC, box=(10.0, 10.0, 10.0), **more):
     """A gas of a few beads; what is not of the beads is of the rules."""
-    of_beads = {'radii', 'masses', 'spins', 'species'}
+    of_beads = {'radii', 'masses', 'spins', 'species', 'drag'}
     beads = beads_of(positions, velocities, **{k: more[k] for k in of_beads & more.keys()})
     rules = {name: value for name, value in more.items() if name not in of_beads}
     return HardSphereGas(beads, CollisionRules(box=box, **rules), kernel)

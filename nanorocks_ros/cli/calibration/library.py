@@ -22,6 +22,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--nodes', type=int, default=800, help='simulated points; default 800')
     parser.add_argument('--runs', type=int, default=12, help='runs at each point; default 12')
     parser.add_argument('--seed', type=int, default=1, help='random seed; default 1')
+    parser.add_argument(
+        '--drag',
+        type=float,
+        default=0.0,
+        help='gas that slows beads of the first species at this rate in 1/s, at a mean speed of '
+        '10 mm/s at the start; default 0: vacuum, which `analyse` needs',
+    )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument(
         '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
@@ -46,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
         nodes=options.nodes,
         runs=options.runs,
         seed=options.seed,
+        drag=options.drag,
     )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     with Progress(f'decays of tray {options.tray}') as progress:

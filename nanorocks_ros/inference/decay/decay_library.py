@@ -180,14 +180,22 @@ def count_step(tray: Tray) -> int:
     return max(1, round(0.05 * max(species.count for species in tray.species)))
 
 
-def tray_key(tray: Tray) -> str:
-    """Properties that determine the cooling of a tray, as a JSON object: inside and beads."""
+def tray_key(tray: Tray, drag: float = 0.0) -> str:
+    """Properties that determine the cooling of a tray, as a JSON object: inside, beads and gas.
+
+    Parameters
+    ----------
+    tray : Tray
+    drag : float, [1/s]
+        See `SimulationSettings`; part of the key where it is above 0.
+    """
     species = [
         {'diameter_low': beads.diameter_low, 'diameter_high': beads.diameter_high}
         | {'density': beads.density, 'count': beads.count}
         for beads in tray.species
     ]
-    return json.dumps({'dimensions': tray.dimensions, 'species': species})
+    gas = {'drag': drag} if drag > 0.0 else {}
+    return json.dumps({'dimensions': tray.dimensions, 'species': species, **gas})
 
 
 def term_count() -> int:

@@ -5,6 +5,7 @@ Tested by ``test/inference/decay/test_decay_library.py``.
 
 from __future__ import annotations
 
+import json
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,11 +52,18 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
     Raises
     ------
     ConfigurationError
-        When it cannot be read, or was made for another tray.
+        When it cannot be read, or was made for another tray or with drag.
     """
     library = load_library(str(path) or f'libraries/tray_{tray.number}.npz', packaged=not path)
+    where = str(path) or f'tray {tray.number}'
+    if drag := json.loads(library.tray).get('drag'):
+        raise ConfigurationError(
+            where,
+            f'the decay library is of a gas with a drag of {drag:g} 1/s; decays are compared with '
+            'those in a vacuum',
+            f'make one without drag: {build_command(tray)}',
+        )
     if library.tray != tray_key(tray):
-        where = str(path) or f'tray {tray.number}'
         raise ConfigurationError(
             where,
             f'the decay library is of a tray with other beads or sides than tray {tray.number}',

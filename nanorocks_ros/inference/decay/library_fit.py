@@ -60,7 +60,7 @@ def distances() -> NDArray[np.float64]:
     return np.geomspace(FIRST_DISTANCE, LAST_DISTANCE, N_DISTANCES)
 
 
-def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
+def fit_library(tray: Tray, decays: Decays, made_by: str, drag: float = 0.0) -> DecayLibrary:
     """Fit a library to decays.
 
     Parameters
@@ -69,6 +69,8 @@ def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
     decays : Decays
     made_by : str
         JSON, stored in the library.
+    drag : float, [1/s]
+        Of the gas in which the beads were simulated.
 
     Returns
     -------
@@ -111,7 +113,7 @@ def fit_library(tray: Tray, decays: Decays, made_by: str) -> DecayLibrary:
         residual = target - matrix @ coefficients[:, k]
         excess += float(np.mean(residual**2) - np.mean(error[:, k] ** 2) * (1.0 - terms / nodes))
     return DecayLibrary(
-        tray=tray_key(tray),
+        tray=tray_key(tray, drag),
         made_by=made_by,
         misfit=math.sqrt(max(excess / x.size, 0.0)),
         base=base,

@@ -25,6 +25,9 @@ class Beads:
         Angular velocities; None: no rotation.
     species : ndarray of int, (n,), or None
         From 0; None: all alike.
+    drag : ndarray (n,) or None, [1/s], >= 0
+        Rate at which a gas at rest slows each bead; spins decay 10/3 times as fast, as those of
+        solid spheres. None, or all 0: no gas.
     """
 
     radii: NDArray[np.float64]
@@ -33,3 +36,4 @@ class Beads:
     velocities: NDArray[np.float64]
     spins: NDArray[np.float64] | None = None
     species: NDArray[np.int32] | None = None
+    drag: NDArray[np.float64] | None = None

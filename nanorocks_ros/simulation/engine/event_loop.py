@@ -172,7 +172,7 @@ def write_due(state: State, rules: Rules, output: RunOutput, until: float) -> No
     times = output.observation_times
     while done[OBSERVATIONS] < times.size and times[done[OBSERVATIONS]] < until:
         k = done[OBSERVATIONS]
-        write_observation(state, rules, output.observations[k])
+        write_observation(state, rules, times[k] - epoch, output.observations[k])
         done[OBSERVATIONS] = k + 1
 
 

@@ -13,6 +13,13 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.wall_collisions import next_wall_event
 from nanorocks_ros.simulation.engine.event_queue import schedule
+from nanorocks_ros.simulation.engine.gas_drag import (
+    drag_rate,
+    flight_time,
+    is_dragged,
+    position_at,
+    velocity_at,
+)
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,
     FLAGS,
@@ -22,17 +29,12 @@ from nanorocks_ros.simulation.engine.gas_state import (
     PARTNER,
     PARTNER_COUNTER,
     RENEW,
-    TIME,
     VX,
-    VY,
-    VZ,
     State,
-    X,
-    Y,
-    Z,
 )
 from nanorocks_ros.simulation.engine.integer_width import as_index, as_int64
-from nanorocks_ros.simulation.engine.pair_times import speed_square, wait_for_contact
+from nanorocks_ros.simulation.engine.pair_times import square_of, wait_for_contact
+from nanorocks_ros.simulation.engine.unequal_drag import wait_with_unequal_drag
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.collision.conservation_ledger import Vector
@@ -42,15 +44,39 @@ _ALL = 63
 
 
 @inlined
-def position_at(state: State, i: int, now: float) -> Vector:
-    """Position of a bead at a time, [m]."""
-    rows = state.rows
-    since = now - rows[i, TIME]
-    return (
-        rows[i, X] + rows[i, VX] * since,
-        rows[i, Y] + rows[i, VY] * since,
-        rows[i, Z] + rows[i, VZ] * since,
-    )
+def wait_for_pair(
+    state: State,
+    rules: Rules,
+    i: int,
+    flight: tuple[Vector, Vector],
+    j: int,
+    now: float,
+    folded: bool,
+    limit: float,
+) -> float:
+    """Time until two beads touch, infinite when they do not before a limit, [s].
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    i : int
+    flight : tuple of 2 vectors, [m], [m/s]
+        Place and velocity of bead i now.
+    j : int
+    now : float, [s]
+    folded : bool
+        Whether the nearest image of j is to be found.
+    limit : float, [s]
+        Later contacts may be left out.
+    """
+    place = position_at(state, j, now)
+    velocity = velocity_at(state, j, now)
+    flights = flight[0], flight[1], place, velocity
+    if is_dragged(state) and drag_rate(state, i) != drag_rate(state, j):
+        return wait_with_unequal_drag(state, rules, i, flights, j, now, folded, limit)
+    wait = wait_for_contact(state, rules, i, flights, j, folded)
+    return flight_time(state, i, wait)
 
 
 @inlined
@@ -87,10 +113,10 @@ def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bo
         if horizon < best:
             best = horizon
             partner = RENEW
-    place = position_at(state, i, now)
+    flight = position_at(state, i, now), velocity_at(state, i, now)
     for j in range(state.rows.shape[0]):
         if j != i:
-            when = now + wait_for_contact(state, rules, i, place, j, now, folded)
+            when = now + wait_for_pair(state, rules, i, flight, j, now, folded, best - now)
             if when < best:
                 best = when
                 partner = j
@@ -100,10 +126,10 @@ def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bo
 @inlined
 def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> None:
     """Predict the next event of a bead from its neighbour list and the near walls."""
-    place = position_at(state, i, now)
+    flight = position_at(state, i, now), velocity_at(state, i, now)
     near = state.links[i, FLAGS] & NEAR
     partner = RENEW
-    best = shell_exit(state, i, now, place)
+    best = shell_exit(state, i, now, flight)
     if near:
         wall_time, wall = next_wall_event(state, rules, i, now, near)
         if wall_time < best:
@@ -112,7 +138,7 @@ def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> 
     neighbours = state.neighbours
     for k in range(1, neighbours[i, 0] + 1):
         j = as_index(neighbours[i, k])
-        when = now + wait_for_contact(state, rules, i, place, j, now, near != 0)
+        when = now + wait_for_pair(state, rules, i, flight, j, now, near != 0, best - now)
         if when < best:
             best = when
             partner = as_int64(j)
@@ -120,21 +146,21 @@ def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> 
 
 
 @inlined
-def shell_exit(state: State, i: int, now: float, place: Vector) -> float:
+def shell_exit(state: State, i: int, now: float, flight: tuple[Vector, Vector]) -> float:
     """Time at which a bead leaves the shell in which its neighbour list is valid."""
-    rows = state.rows
-    a = speed_square(rows, i)
+    place, velocity = flight
+    a = square_of(velocity)
     if a == 0.0:
         return np.inf
     qx = place[0] - state.references[i, 0]
     qy = place[1] - state.references[i, 1]
     qz = place[2] - state.references[i, 2]
-    b = qx * rows[i, VX] + qy * rows[i, VY] + qz * rows[i, VZ]
+    b = qx * velocity[0] + qy * velocity[1] + qz * velocity[2]
     c = qx * qx + qy * qy + qz * qz - state.reach[HALF_SKIN] * state.reach[HALF_SKIN]
     if c >= 0.0:
         return now
     root = math.sqrt(b * b - a * c)
-    return now + (-c / (b + root) if b > 0.0 else (root - b) / a)
+    return now + flight_time(state, i, -c / (b + root) if b > 0.0 else (root - b) / a)
 
 
 @inlined

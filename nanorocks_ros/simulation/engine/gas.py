@@ -26,6 +26,7 @@ from nanorocks_ros.simulation.engine.gas_state import (
 from nanorocks_ros.simulation.engine.gas_view import GasView
 from nanorocks_ros.simulation.engine.input_checks import (
     check_beads,
+    check_drag,
     check_species,
     check_spins,
     check_times,
@@ -283,10 +284,11 @@ class HardSphereGas(GasView):
         n = checked[0].size
         species = check_species(beads.species, n, self._known_species)
         spins = check_spins(beads.spins, n, self._rules.rough)
+        drag = check_drag(beads.drag, n)
         n_species = max(int(species.max()) + 1, self._known_species)
         rules = self._rules._replace(
             restitution=restitution_table(self._rules.restitution, n_species)
         )
-        state = arranged_state(checked, species, spins, rules, kernel)
+        state = arranged_state(checked, (species, spins, drag), rules, kernel)
         refuse_overlap(*overlapping_pair(state, rules))
         self._state, self._rules, self._n_species = state, rules, n_species

@@ -87,6 +87,9 @@ class State(NamedTuple):
     times : ndarray, [s]
     levels : ndarray of int64
         The queue.
+    drag : ndarray (0,) or (n, 2), [1/s]
+        Without drag, or with it: decay rate of the velocity of each bead, and of its body. The
+        number of axes tells the compiler which.
     masses : ndarray (n, 1) or (n, 2), [kg]
         Of each bead; with sticking also of the body of that number, infinite when it is stuck
         to a wall.
@@ -124,6 +127,7 @@ class State(NamedTuple):
     bodies: NDArray[np.int32]
     times: NDArray[np.float64]
     levels: NDArray[np.int64]
+    drag: NDArray[np.float64]
     masses: NDArray[np.float64]
     spins: NDArray[np.float64]
     images: NDArray[np.int32]
@@ -146,6 +150,7 @@ def new_state(
     radii: NDArray[np.float64],
     masses: NDArray[np.float64],
     species: NDArray[np.int32],
+    drag: NDArray[np.float64],
     rules: Rules,
 ) -> State:
     """State at time 0, without lists and without predicted events.
@@ -155,6 +160,8 @@ def new_state(
     positions, velocities : ndarray (n, 3), [m], [m/s]
     radii, masses : ndarray (n,), [m], [kg]
     species : ndarray of int32, (n,)
+    drag : ndarray (0,) or (n, 2), [1/s]
+        See `State`.
     rules : Rules
     """
     n = radii.size
@@ -186,6 +193,7 @@ def new_state(
         bodies,
         times,
         levels,
+        drag,
         weights,
         np.zeros((n if rules.rough else 0, 3)),
         np.zeros((n if periodic else 0, 3), dtype=np.int32),

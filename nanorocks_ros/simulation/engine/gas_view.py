@@ -12,6 +12,7 @@ import numpy as np
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.event_counts import EventCounts
 from nanorocks_ros.simulation.engine.event_loop import snapshot
+from nanorocks_ros.simulation.engine.gas_drag import OWN_RATE
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     EPOCH,
@@ -49,6 +50,13 @@ class GasView:
     def masses(self) -> NDArray[np.float64]:
         """Mass of each bead, (n,), [kg]."""
         return self._by_number(self._state.masses[:, 0])
+
+    @property
+    def drag(self) -> NDArray[np.float64] | None:
+        """Rate at which the gas slows each bead, (n,), [1/s]; None without drag."""
+        if not self._state.drag.size:
+            return None
+        return self._by_number(self._state.drag[:, OWN_RATE])
 
     @property
     def bodies(self) -> NDArray[np.int32]:
@@ -109,4 +117,5 @@ class GasView:
             velocities=velocities,
             spins=spins if self._rules.rough else None,
             species=self._by_number(self._state.links[:, FLAGS] >> SPECIES),
+            drag=self.drag,
         )

@@ -97,6 +97,19 @@ def check_spins(spins: ArrayLike | None, n: int, rough: bool) -> NDArray[np.floa
     return numbers
 
 
+def check_drag(drag: ArrayLike | None, n: int) -> NDArray[np.float64]:
+    """Decay rates of each bead and of its body, (n, 2); (0,) where none is above 0."""
+    if drag is None:
+        return np.zeros(0)
+    rates = _finite('drag', drag, (n,))
+    if rates.min() < 0.0:
+        worst = int(rates.argmin())
+        raise SimulationError(
+            'drag', f'bead {worst} has {float(rates[worst])!r} 1/s', 'give 0 or more'
+        )
+    return np.stack((rates, rates), axis=1) if rates.any() else np.zeros(0)
+
+
 def check_room(radii: NDArray[np.float64], rules: Rules) -> None:
     """Refuse beads that are larger than the box or fill more than its volume.
 

@@ -38,8 +38,7 @@ class Kernel(IntEnum):
 
 def arranged_state(
     checked: tuple[NDArray[np.float64], ...],
-    species: NDArray[np.int32],
-    spins: NDArray[np.float64],
+    details: tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]],
     rules: Rules,
     kernel: Kernel,
 ) -> State:
@@ -49,8 +48,8 @@ def arranged_state(
     ----------
     checked : tuple of ndarray
         Radii, masses, positions and velocities, see `check_beads`.
-    species : ndarray of int32, (n,)
-    spins : ndarray (n, 3) or (0, 3), [rad/s]
+    details : tuple of ndarray
+        Species (n,); spins (n, 3) or (0, 3), [rad/s]; drag (n, 2) or (0,), [1/s].
     rules : Rules
     kernel : Kernel
 
@@ -60,6 +59,7 @@ def arranged_state(
         For lists in a periodic box that is too small for them.
     """
     radii, masses, positions, velocities = checked
+    species, spins, drag = details
     skin = list_skin(radii, rules)
     if kernel == Kernel.LISTS and not skin:
         raise SimulationError(
@@ -72,7 +72,13 @@ def arranged_state(
     if listed:
         order = z_order(positions, 2.0 * float(radii.max()) + skin)
     state = new_state(
-        positions[order], velocities[order], radii[order], masses[order], species[order], rules
+        positions[order],
+        velocities[order],
+        radii[order],
+        masses[order],
+        species[order],
+        drag[order] if drag.size else drag,
+        rules,
     )
     state.links[:, ORIGINAL] = order
     if spins.shape[0]:

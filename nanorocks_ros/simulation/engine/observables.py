@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
+from nanorocks_ros.simulation.engine.gas_drag import flown_time, speed_left, spin_left, velocity_at
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTS,
@@ -17,8 +18,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     SPECIES,
     TIME,
     VX,
-    VY,
-    VZ,
     State,
     X,
 )
@@ -64,27 +63,32 @@ def write_frame(
     for i in range(rows.shape[0]):
         number = as_int64(state.links[i, ORIGINAL])
         since = time - rows[i, TIME]
+        flown = flown_time(state, i, since)
+        left = speed_left(state, i, since)
         for axis in range(3):
-            position = rows[i, X + axis] + rows[i, VX + axis] * since
+            position = rows[i, X + axis] + rows[i, VX + axis] * flown
             if state.images.shape[0]:
                 position += state.images[i, axis] * rules.sides[axis]
             positions[number, axis] = position
-            velocities[number, axis] = rows[i, VX + axis]
+            velocities[number, axis] = rows[i, VX + axis] * left
         if spins.shape[0]:
+            left = spin_left(state, i, since)
             for axis in range(3):
-                spins[number, axis] = state.spins[i, axis]
+                spins[number, axis] = state.spins[i, axis] * left
         if bodies.shape[0]:
             bodies[number] = state.bodies[i, BODY]
 
 
 @inlined
-def write_observation(state: State, rules: Rules, row: NDArray[np.float64]) -> None:
-    """Write sums over the beads.
+def write_observation(state: State, rules: Rules, time: float, row: NDArray[np.float64]) -> None:
+    """Write sums over the beads at a time.
 
     Parameters
     ----------
     state : State
     rules : Rules
+    time : float, [s]
+        Since the epoch.
     row : ndarray (n_columns,)
         Written; see the columns.
     """
@@ -96,7 +100,7 @@ def write_observation(state: State, rules: Rules, row: NDArray[np.float64]) -> N
     projected = 0.0
     bodies = 0 if state.bodies.shape[0] else n
     for i in range(n):
-        vx, vy, vz = rows[i, VX], rows[i, VY], rows[i, VZ]
+        vx, vy, vz = velocity_at(state, i, time)
         in_plane = vx * vx + vy * vy
         speed += math.sqrt(in_plane + vz * vz)
         projected += math.sqrt(in_plane)

@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
-from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS, TIME, VX, VY, VZ, X, Y, Z
+from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS, VX, VY, VZ
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+
+Vector = tuple[float, float, float]
+Flights = tuple[Vector, Vector, Vector, Vector]
 
 # Squares of the approach, relative to the speeds, that is rounding; and of the gap, relative to
 # the distance, of beads that touch.
@@ -38,6 +41,12 @@ def speed_square(rows: NDArray[np.float64], i: int) -> float:
     """Square of the speed of a bead, [m^2/s^2]."""
     vx, vy, vz = rows[i, VX], rows[i, VY], rows[i, VZ]
     return float(vx * vx + vy * vy + vz * vz)
+
+
+@inlined
+def square_of(velocity: Vector) -> float:
+    """Square of a velocity, [m^2/s^2]."""
+    return velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2]
 
 
 @inlined
@@ -64,15 +73,9 @@ def is_rounding(
 
 @inlined
 def wait_for_contact(
-    state: State,
-    rules: Rules,
-    i: int,
-    place: tuple[float, float, float],
-    j: int,
-    now: float,
-    folded: bool,
+    state: State, rules: Rules, i: int, flights: Flights, j: int, folded: bool
 ) -> float:
-    """Time until two beads touch, infinite when they never do, [s].
+    """Time until two beads touch that fly straight, infinite when they never do, [s].
 
     Overlapping and approaching beads touch now.
 
@@ -81,21 +84,20 @@ def wait_for_contact(
     state : State
     rules : Rules
     i : int
-    place : tuple of 3 floats, [m]
-        Where bead i is now.
+    flights : tuple of 4 vectors, [m], [m/s], [m], [m/s]
+        Place and velocity now of bead i, then of bead j.
     j : int
-    now : float, [s]
     folded : bool
         Whether the nearest image of j is to be found.
     """
     rows = state.rows
-    since = now - rows[j, TIME]
-    ux = rows[j, VX] - rows[i, VX]
-    uy = rows[j, VY] - rows[i, VY]
-    uz = rows[j, VZ] - rows[i, VZ]
-    dx = rows[j, X] + rows[j, VX] * since - place[0]
-    dy = rows[j, Y] + rows[j, VY] * since - place[1]
-    dz = rows[j, Z] + rows[j, VZ] * since - place[2]
+    place, velocity, other_place, other_velocity = flights
+    ux = other_velocity[0] - velocity[0]
+    uy = other_velocity[1] - velocity[1]
+    uz = other_velocity[2] - velocity[2]
+    dx = other_place[0] - place[0]
+    dy = other_place[1] - place[1]
+    dz = other_place[2] - place[2]
     if folded:
         dx = minimum_image(rules, 0, dx)
         dy = minimum_image(rules, 1, dy)
@@ -107,7 +109,7 @@ def wait_for_contact(
     square = dx * dx + dy * dy + dz * dz
     gap_square = square - reach * reach
     if gap_square <= _TOUCHING * square and is_rounding(
-        approach, square, speed_square(rows, i), speed_square(rows, j)
+        approach, square, square_of(velocity), square_of(other_velocity)
     ):
         return np.inf
     if gap_square <= 0.0:

@@ -224,6 +224,10 @@ class SceneFilm:
         first, period = self._simulation.first_shake, self._simulation.shake_period
         return [first + k * period for k in range(cycle)]
 
+    def drag(self, tray: int) -> np.ndarray:
+        """Rate at which the gas slows each bead of a tray, (n,), [1/s]; 0 in a vacuum."""
+        return self._gases[tray].drag
+
     def _truth(
         self, tray: int, stamp_ns: int, state: tuple[np.ndarray, np.ndarray], motion: PlateMotion
     ) -> BeadsTruth:

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
 
-# Arbitrary: the decay is a function of speed times time alone.
-_MEAN_SPEED = 0.01
+# In space, [m/s]. Arbitrary without drag: then the decay is a function of speed times time alone.
+MEAN_SPEED = 0.01
 # The mean projected speed of a drawn start is within these factors of the expected one.
 _SLOWER, _FASTER = 0.3, 3.0
 _TIMES = 150
@@ -58,12 +58,16 @@ class LibraryPlan:
     runs : int
         Runs at each node.
     seed : int
+    drag : float, [1/s]
+        As the setting of that name, at the mean speed of `MEAN_SPEED` at the start: what counts is
+        the drag over the speed.
     """
 
     tray: Tray
     nodes: int
     runs: int
     seed: int = 1
+    drag: float = 0.0
 
     def specification(self) -> str:
         """Everything that the library depends on, as a JSON object."""
@@ -73,7 +77,7 @@ class LibraryPlan:
                 'nodes': self.nodes,
                 'runs': self.runs,
                 'seed': self.seed,
-                'tray': json.loads(tray_key(self.tray)),
+                'tray': json.loads(tray_key(self.tray, self.drag)),
             }
         )
 
@@ -129,11 +133,13 @@ def build_library(
             f'{plan.nodes}, {plan.runs}',
             f'give {fewest_nodes()} and 2 or more: fewer do not give an error estimate',
         )
+    # A drag out of range is refused before any work.
+    _simulated(plan, 0)
     workers = workers or Workers()
     workers.check()
     with resumed_journal(output, plan.specification(), notice) as journal:
         fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
-        library = fit_library(plan.tray, _decays(plan, journal), plan.specification())
+        library = fit_library(plan.tray, _decays(plan, journal), plan.specification(), plan.drag)
         write_archive(output, library_arrays(library))
     return library
 
@@ -178,7 +184,7 @@ def cool_node(plan: LibraryPlan, number: int) -> NDArray[np.float64]:
     from nanorocks_ros.simulation.ensemble import cooling_runs
 
     x = distances()
-    times = np.geomspace(x[0] / (_FASTER * _MEAN_SPEED), x[-1] / (_SLOWER * _MEAN_SPEED), _TIMES)
+    times = np.geomspace(x[0] / (_FASTER * MEAN_SPEED), x[-1] / (_SLOWER * MEAN_SPEED), _TIMES)
     settings, tray = _simulated(plan, number)
     runs = [(number << 32) + run for run in range(plan.runs)]
     speed = cooling_runs(settings, tray, np.concatenate(([0.0], times)), runs).mean_projected_speed
@@ -214,7 +220,8 @@ def _simulated(plan: LibraryPlan, number: int) -> tuple[SimulationSettings, Tray
         'floor_lid_difference': ends - wall,
         'vertical_speed_factor': math.exp(node['anisotropy']),
         'speeds': 'maxwellian' if node['start'] > 0.0 else 'uniform',
-        'mean_speed': _MEAN_SPEED,
+        'mean_speed': MEAN_SPEED,
+        'drag': plan.drag,
     }
     return (
         with_values(SimulationSettings(), values, 'decay library'),

@@ -63,6 +63,8 @@ class DrawnFilm:
         The smallest number of a bead in the body of each bead.
     radii : ndarray (beads,), [m]
     species : ndarray of int, (beads,)
+    drag : ndarray (beads,), [1/s]
+        Rate at which the gas slows each bead; 0 in a vacuum.
     """
 
     video: Path
@@ -83,6 +85,7 @@ class DrawnFilm:
     bodies: NDArray[np.int32]
     radii: NDArray[np.float64]
     species: NDArray[np.int32]
+    drag: NDArray[np.float64]
 
 
 def write_drawn_film(
@@ -146,6 +149,7 @@ def write_film(path: Path, tray: Tray, camera: DrawnCamera, seconds: float) -> D
         video=video,
         truth=path.with_name(path.name + '.npz'),
         camera=camera,
+        drag=film.drag(tray.number),
         region=(float(corner[0]), float(corner[1]), *sides),
     )
     _save(drawn, tray)
@@ -205,6 +209,7 @@ def _save(film: DrawnFilm, tray: Tray) -> None:
         B=film.bodies.astype(np.int16),
         rad=film.radii,
         sp=film.species,
+        drag=film.drag,
         box=np.array(tray.dimensions),
         merges=_merges(film),
         fps=film.frame_rate,

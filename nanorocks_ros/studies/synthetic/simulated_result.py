@@ -33,6 +33,8 @@ class SimulatedRun:
     counts : EventCounts
     cpu_seconds : float, [s]
     radii, masses : ndarray (n,), [m], [kg]
+    drag : ndarray (n,) or None, [1/s]
+        Rate at which the gas slows each bead; None in a vacuum.
     positions, velocities : ndarray (n_kept, n, 3), [m], [m/s]
         At the times of `SimulationPlan.bead_times`.
     spins : ndarray (n_kept, n, 3) or None, [rad/s]
@@ -51,6 +53,7 @@ class SimulatedRun:
     cpu_seconds: float
     radii: NDArray[np.float64]
     masses: NDArray[np.float64]
+    drag: NDArray[np.float64] | None
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
     spins: NDArray[np.float64] | None

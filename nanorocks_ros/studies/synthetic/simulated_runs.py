@@ -140,6 +140,7 @@ def _run_record(gas: HardSphereGas, course: RunRecord, run: int, seconds: float)
         cpu_seconds=seconds,
         radii=gas.radii,
         masses=gas.masses,
+        drag=gas.drag,
         positions=course.positions,
         velocities=course.velocities,
         spins=course.spins,

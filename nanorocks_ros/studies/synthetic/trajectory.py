@@ -45,8 +45,9 @@ def write_trajectory(path: Path, simulated: SimulatedRuns) -> None:
         ``.npz``: arrays `times` (samples,), `runs`, `box` (3,), and for each bead `ids`,
         `species`, `materials`, `radii`, `masses`, `positions` and `velocities`
         (samples, n, 3), `spins` of rough beads, `body` (samples, n), the smallest number of
-        a bead that moves with this one. With several runs, arrays that differ between runs
-        have them as first axis. ``.parquet``: a row for each bead at each time of each run.
+        a bead that moves with this one, `drag` (n,) in a gas that slows beads. With several
+        runs, arrays that differ between runs have them as first axis. ``.parquet``: a row for
+        each bead at each time of each run.
         Either holds `provenance`, as JSON; units are SI.
     simulated : SimulatedRuns
         Of a plan that keeps the trajectory.
@@ -117,6 +118,8 @@ def _bead_arrays(simulated: SimulatedRuns) -> dict[str, Callable[[], Any]]:
     names = ['radii', 'masses', 'positions', 'velocities', 'body']
     if simulated.runs[0].spins is not None:
         names.append('spins')
+    if simulated.runs[0].drag is not None:
+        names.append('drag')
     return {
         'times': lambda: simulated.plan.times,
         'runs': lambda: np.array([run.number for run in simulated.runs], dtype=np.int32),
@@ -143,6 +146,7 @@ def _bead_columns(simulated: SimulatedRuns) -> tuple[Column, ...]:
     vectors = [('', 'm'), ('v', 'm/s')]
     if simulated.runs[0].spins is not None:
         vectors.append(('w', 'rad/s'))
+    drag = [] if simulated.runs[0].drag is None else [Column(name='drag', kind='f8', unit='1/s')]
     return (
         Column(name='run', kind='i4'),
         Column(name='time', kind='f8', unit='s'),
@@ -152,6 +156,7 @@ def _bead_columns(simulated: SimulatedRuns) -> tuple[Column, ...]:
         Column(name='material', kind='text'),
         Column(name='radius', kind='f8', unit='m'),
         Column(name='mass', kind='f8', unit='kg'),
+        *drag,
         *(
             Column(name=f'{letter}{axis}', kind='f8', unit=unit)
             for letter, unit in vectors
@@ -179,6 +184,8 @@ def _bead_rows(simulated: SimulatedRuns, run: SimulatedRun) -> dict[str, NDArray
         'radius': of_beads(run.radii),
         'mass': of_beads(run.masses),
     }
+    if run.drag is not None:
+        rows['drag'] = of_beads(run.drag)
     for letter, vectors in (('', run.positions), ('v', run.velocities), ('w', run.spins)):
         for k, axis in enumerate(_AXES):
             if vectors is not None:

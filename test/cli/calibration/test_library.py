@@ -15,6 +15,7 @@ from nanorocks_ros.cli.main import main
         (('--tray', '1', '-o', 'nowhere/a.npz'), 1, 'there is no folder nowhere'),
         (('--tray', '1', '-o', 'a.npz', '--trays-file', 'no.yaml'), 2, 'no.yaml'),
         (('--tray', '1', '-o', 'a.npz', '--workers', '0'), 2, '--workers'),
+        (('--tray', '1', '-o', 'a.npz', '--drag', '-1'), 2, 'drag'),
     ],
 )
 def test_a_wrong_call_is_one_line(tmp_path, monkeypatch, capsys, arguments, code, message):

@@ -58,6 +58,17 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
     assert float(lines[-1]['mean_projected_speed [m/s]']) == sweep.mean_projected_speed[2, 1, 2]
 
 
+def test_drag_is_an_axis_and_slows_the_gas(tmp_path, capsys):
+    arguments = ['sweep', *SMALL, '--drag', '0,0.1', '--json', '-o', str(tmp_path / 'a.npz')]
+    assert main(arguments) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed['axes'] == {'drag': [0.0, 0.1]}
+    free, dragged = np.array(printed['mean_speed'])[:, -1]
+    time = printed['time'][-1]
+    # The clock of the gas runs slower: it has lost less in collisions than the other.
+    assert np.exp(-0.1 * time) < dragged / free < np.exp(-0.05 * time)
+
+
 def test_unknown_values_are_null(tmp_path, capsys):
     output = str(tmp_path / 'a.npz')
     assert main(['sweep', '--runs', '1', '--times', '0,1', '-o', output, '--json']) == 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +12,15 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library import tray_key
-from nanorocks_ros.inference.decay.decay_library_file import load_library
+from nanorocks_ros.inference.decay.decay_library_file import library_of, load_library
+from nanorocks_ros.inference.decay.library_fit import distances
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
+from nanorocks_ros.studies.libraries.decay_simulations import (
+    MEAN_SPEED,
+    LibraryPlan,
+    build_library,
+    cool_node,
+)
 
 TRAY = load_trays()[1]
 # Few beads in few runs: quick, and of no use but to see how it is made.
@@ -61,6 +69,32 @@ def test_parts_of_another_library_are_not_mixed_in(tmp_path):
         build_library(PLAN, path, HERE, stop)
     with pytest.raises(RecordingError, match='belongs to another job'):
         build_library(replace(PLAN, seed=2), path, HERE)
+
+
+def test_a_library_made_with_drag_says_so_and_is_not_compared_with_decays(tmp_path):
+    path = tmp_path / 'dragged.npz'
+    plan = replace(PLAN, drag=0.05)
+    build_library(plan, path, HERE)
+    library = load_library(str(path), packaged=False)
+    assert library.tray == tray_key(PLAN.tray, 0.05) != tray_key(PLAN.tray)
+    assert json.loads(library.made_by)['tray']['drag'] == 0.05
+    with pytest.raises(ConfigurationError, match=r'drag of 0.05 1/s.*make one without drag'):
+        library_of(PLAN.tray, path)
+    assert 'drag' not in json.loads(PLAN.specification())['tray']
+    with pytest.raises(ConfigurationError, match='drag'):
+        build_library(replace(PLAN, drag=-1.0), tmp_path / 'negative.npz', HERE)
+
+
+def test_decays_with_drag_are_those_without_in_another_clock():
+    plan = replace(PLAN, tray=TRAY, runs=60)
+    rate = 0.05
+    free, dragged = (cool_node(replace(plan, drag=drag), 7).mean(axis=0) for drag in (0.0, rate))
+    # The mean projected speed is pi/4 of that in space, which each run scatters about by 15 %.
+    time = distances() / (0.25 * math.pi * MEAN_SPEED)
+    early = time < 0.5 / rate
+    expected = np.interp(-np.expm1(-rate * time) / rate, time, free) - rate * time
+    assert dragged[early] == pytest.approx(expected[early], abs=0.05)
+    assert dragged[early][-1] < free[early][-1] - 0.2
 
 
 def test_too_few_nodes_are_refused_before_any_work(tmp_path):

@@ -59,6 +59,23 @@ def test_arrays_hold_every_bead(tmp_path):
     np.testing.assert_array_equal(arrays['box'], [0.032, 0.01, 0.003])
 
 
+def test_the_drag_of_each_bead_is_written_where_there_is_a_gas(tmp_path):
+    simulated = runs_of(drag=0.03)
+    write_trajectory(tmp_path / 'run.npz', simulated)
+    arrays = read(tmp_path / 'run.npz')
+    assert arrays['drag'].shape == (55,)
+    assert arrays['drag'][0] == pytest.approx(0.03, rel=1e-12)
+    weights = arrays['drag'] * arrays['masses'] / arrays['radii']
+    assert weights == pytest.approx(weights[0], rel=1e-9)
+    assert json.loads(str(arrays['provenance']))['settings']['drag'] == 0.03
+    pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    write_trajectory(tmp_path / 'run.parquet', simulated)
+    column = parquet.read_table(tmp_path / 'run.parquet')['drag'].to_numpy()
+    np.testing.assert_array_equal(column, np.tile(arrays['drag'], 6))
+
+
 def test_runs_are_the_first_axis_of_what_differs(tmp_path, two_runs):
     write_trajectory(tmp_path / 'runs.npz', two_runs)
     arrays = read(tmp_path / 'runs.npz')

@@ -8,6 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.simulation.engine.gas_drag import (
+    flown_time,
+    is_dragged,
+    joined_drag_rate,
+    set_body_drag,
+    speed_left,
+    spin_left,
+)
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTER,
@@ -34,10 +42,20 @@ def advance(state: State, i: int, now: float) -> None:
     """Move a bead in free flight to a time."""
     rows = state.rows
     since = now - rows[i, TIME]
-    rows[i, X] += rows[i, VX] * since
-    rows[i, Y] += rows[i, VY] * since
-    rows[i, Z] += rows[i, VZ] * since
+    flown = flown_time(state, i, since)
+    rows[i, X] += rows[i, VX] * flown
+    rows[i, Y] += rows[i, VY] * flown
+    rows[i, Z] += rows[i, VZ] * flown
     rows[i, TIME] = now
+    if is_dragged(state):
+        left = speed_left(state, i, since)
+        rows[i, VX] *= left
+        rows[i, VY] *= left
+        rows[i, VZ] *= left
+        if state.spins.shape[0]:
+            left = spin_left(state, i, since)
+            for axis in range(3):
+                state.spins[i, axis] *= left
 
 
 @inlined
@@ -130,10 +148,17 @@ def join_bodies(state: State, rules: Rules, i: int, j: int) -> None:
     second = as_int64(state.bodies[j, BODY])
     label = min(first, second)
     mass = state.masses[first, OF_BODY] + state.masses[second, OF_BODY]
+    rate = 0.0
+    if is_dragged(state):
+        rate = joined_drag_rate(
+            state, i, j, state.masses[first, OF_BODY], state.masses[second, OF_BODY]
+        )
     k = i
     while True:
         state.bodies[k, BODY] = label
         clear_spin(state, rules, k)
+        if is_dragged(state):
+            set_body_drag(state, k, rate)
         k = as_int64(state.bodies[k, FOLLOWING])
         if k == i:
             break
@@ -141,6 +166,8 @@ def join_bodies(state: State, rules: Rules, i: int, j: int) -> None:
     while True:
         state.bodies[k, BODY] = label
         clear_spin(state, rules, k)
+        if is_dragged(state):
+            set_body_drag(state, k, rate)
         k = as_int64(state.bodies[k, FOLLOWING])
         if k == j:
             break

@@ -22,6 +22,7 @@ from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
     length,
 )
 from nanorocks_ros.simulation.engine.collision.friction import apply_pair_friction
+from nanorocks_ros.simulation.engine.gas_drag import is_dragged
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,
     COUNTER,
@@ -54,6 +55,7 @@ from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     random_restitution,
     viscoelastic_restitution,
 )
+from nanorocks_ros.simulation.engine.unequal_drag import is_apart, with_least_separation
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
@@ -159,6 +161,8 @@ def collide_pair(state: State, rules: Rules, i: int, j: int, now: float) -> int:
     speeds = speed_square(rows, i), speed_square(rows, j)
     if approach >= 0.0 or is_rounding(approach, square, speeds[0], speeds[1]):
         return 0
+    if is_dragged(state) and is_apart(rows[i, RADIUS] + rows[j, RADIUS], square):
+        return 0
     distance = math.sqrt(square)
     closing = approach / distance
     elastic = is_same_contact(state, rules, i, j, now)
@@ -173,6 +177,11 @@ def collide_pair(state: State, rules: Rules, i: int, j: int, now: float) -> int:
         state.counts[ELASTIC_PAIR] += 1
     else:
         restitution = pair_restitution(state, rules, i, j, -closing)
+    if is_dragged(state):
+        along_i = (dx * rows[i, VX] + dy * rows[i, VY] + dz * rows[i, VZ]) / distance
+        restitution = with_least_separation(
+            state, rules, i, j, (along_i, along_i + closing), restitution
+        )
     state.counts[PAIR] += 1
     change = (1.0 + restitution) * closing
     per_length = (1.0 + restitution) * approach / square

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.exponentials import decay_time, decayed
+from nanorocks_ros.simulation.engine.gas_drag import flown
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
@@ -56,7 +58,7 @@ def largest_excursion(rules: Rules, axis: int, time: float) -> float:
 
 @compiled
 def time_to_moving_wall(
-    rules: Rules, axis: int, place: tuple[float, float, float], far: int, now: float
+    rules: Rules, axis: int, bead: tuple[float, float, float, float], far: int, now: float
 ) -> float:
     """Time at which a bead meets a wall that moves with the tray.
 
@@ -67,8 +69,8 @@ def time_to_moving_wall(
     ----------
     rules : Rules
     axis : int
-    place : tuple of 3 floats, [m], [m/s], [m]
-        Coordinate, velocity and radius of the bead.
+    bead : tuple of 4 floats, [m], [m/s], [m], [1/s]
+        Coordinate, velocity and radius, and the decay rate of the velocity.
     far : int
         0 for the low wall, 1 for the high one.
     now : float, [s]
@@ -79,27 +81,36 @@ def time_to_moving_wall(
     float, [s]
         Infinite when it never does.
     """
-    position, velocity, radius = place
+    position, velocity, radius, rate = bead
     outward = 1.0 if far else -1.0
     # Distance from the wall at rest, and how fast it shrinks.
     distance = rules.sides[axis] - radius - position if far else position - radius
-    closing = outward * velocity
+    first = outward * velocity
+    closing = first
     time = now
     for _ in range(_MOST_STEPS):
-        left = distance - closing * (time - now)
+        left = distance - first * flown(rate, time - now)
+        if rate > 0.0:
+            closing = first * decayed(rate * (time - now))[1]
         beyond = left - largest_excursion(rules, axis, time)
         if beyond > _CLOSED * radius:
             # Out of reach of the wall at any displacement.
             if closing <= 0.0:
                 return np.inf
-            time += max(beyond / closing, _LEAST_STEP * abs(time))
+            wait = beyond / closing
+            if rate > 0.0:
+                wait = decay_time(rate * wait) / rate
+            time += max(wait, _LEAST_STEP * abs(time))
+            if math.isinf(time):
+                break
             continue
         moved, speed = tray_displacement(rules, axis, time)
         gap = left + outward * moved
         opening = outward * speed - closing
         if gap <= _CLOSED * radius and opening < 0.0:
             return time
-        time = earliest_contact_time(rules, axis, time, max(gap, 0.0), opening)
+        bend = rate * max(-closing, 0.0)
+        time = earliest_contact_time(rules, axis, time, (max(gap, 0.0), opening, bend))
         if math.isinf(time):
             break
     return time
@@ -107,7 +118,7 @@ def time_to_moving_wall(
 
 @compiled
 def earliest_contact_time(
-    rules: Rules, axis: int, time: float, gap: float, opening: float
+    rules: Rules, axis: int, time: float, approach: tuple[float, float, float]
 ) -> float:
     """Lower bound of the time at which the gap to a moving wall closes.
 
@@ -116,15 +127,15 @@ def earliest_contact_time(
     rules : Rules
     axis : int
     time : float, [s]
-    gap, opening : float, [m], [m/s]
-        At that time.
+    approach : tuple of 3 floats, [m], [m/s], [m/s^2]
+        Gap and its opening speed at that time; how fast drag slows the opening.
     """
-    bend = 0.0
+    gap, opening, bend = approach
     until = np.inf
     if time < rules.start:
         until = rules.start
     elif time < rules.end:
-        bend = largest_acceleration(rules, axis, time)
+        bend += largest_acceleration(rules, axis, time)
         until = rules.end
     root = math.sqrt(opening * opening + 2.0 * bend * gap)
     if opening < 0.0:

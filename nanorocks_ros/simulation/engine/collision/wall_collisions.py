@@ -32,6 +32,13 @@ from nanorocks_ros.simulation.engine.collision.moving_walls import (
     time_to_moving_wall,
     tray_displacement,
 )
+from nanorocks_ros.simulation.engine.gas_drag import (
+    drag_rate,
+    flight_time,
+    is_dragged,
+    position_at,
+    velocity_at,
+)
 from nanorocks_ros.simulation.engine.gas_state import (
     ELASTIC_WALL,
     EPOCH,
@@ -41,7 +48,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     ORIGINAL,
     RADIUS,
     SPIN,
-    TIME,
     VX,
     VY,
     VZ,
@@ -96,24 +102,27 @@ def next_wall_event(
         Bits of the walls to check, two for each axis.
     """
     rows = state.rows
-    since = now - rows[i, TIME]
+    rate = drag_rate(state, i) if is_dragged(state) else 0.0
+    place = position_at(state, i, now)
+    flying = velocity_at(state, i, now)
     best = np.inf
     partner = -1
     for axis in range(3):
         if rules.periodic[axis] or (near >> (2 * axis)) & 3 == 0:
             continue
-        velocity = rows[i, VX + axis]
-        position = rows[i, X + axis] + velocity * since
+        velocity = flying[axis]
+        position = place[axis]
         if rules.moving and rules.amplitude[axis] != 0.0:
             epoch = state.clock[EPOCH]
             for far in range(2):
-                place = (position, velocity, rows[i, RADIUS])
-                when = time_to_moving_wall(rules, axis, place, far, epoch + now) - epoch
+                bead = position, velocity, rows[i, RADIUS], rate
+                when = time_to_moving_wall(rules, axis, bead, far, epoch + now) - epoch
                 if when < best:
                     best = max(when, now)
                     partner = -1 - (2 * axis + far)
         else:
             wait, far = time_to_wall(position, velocity, rows[i, RADIUS], rules.sides[axis])
+            wait = flight_time(state, i, wait)
             if now + wait < best:
                 best = now + wait
                 partner = -1 - (2 * axis + far)
@@ -184,7 +193,7 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     before = rows[i, VX + axis] - wall_speed
     after = -restitution * before
     if rules.moving:
-        after = with_least_rebound(state, rules, wall, now, after)
+        after = with_least_rebound(state, rules, i, wall, now, after)
     rows[i, VX + axis] = wall_speed + after
     mass = mass_of(state, rules, i)
     normal_impulse = mass * (before - after)
@@ -200,7 +209,9 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
 
 
 @inlined
-def with_least_rebound(state: State, rules: Rules, wall: int, now: float, after: float) -> float:
+def with_least_rebound(
+    state: State, rules: Rules, i: int, wall: int, now: float, after: float
+) -> float:
     """Speed relative to a moving wall after a bounce, at least that of half a contact duration.
 
     Without this, an accelerating wall would hit the same bead without end at one instant.
@@ -208,7 +219,10 @@ def with_least_rebound(state: State, rules: Rules, wall: int, now: float, after:
     time = state.clock[EPOCH] + now
     if not rules.start <= time < rules.end:
         return after
-    least = 0.5 * largest_acceleration(rules, wall // 2, time) * rules.contact_duration
+    pressing = largest_acceleration(rules, wall // 2, time)
+    if is_dragged(state):
+        pressing += drag_rate(state, i) * abs(state.rows[i, VX + wall // 2])
+    least = 0.5 * pressing * rules.contact_duration
     if abs(after) >= least:
         return after
     return -least if wall % 2 else least
