@@ -99,8 +99,8 @@ def _restitutions(together: Combined) -> Section:
         title='Restitution of all cycles together',
         parts=[
             Table(
-                head=('tray', 'cycles', 'decays left out', 'source', 'beads', 'walls', 'rebounds', 'collisions',
-                      'tension'),
+                head=('tray', 'cycles', 'decays left out', 'source', 'beads', 'walls', 'rebounds',
+                      'collisions', 'tension'),
                 rows=[_together(tray) for tray in _known(together)],
                 caption='What decays, rebounds and collisions of all cycles say together. What is '
                 'not known of tray, camera and start is the same in all of them: it is part of '
