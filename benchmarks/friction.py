@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _FRICTIONS = (0.0, 0.01, 0.03, 0.1)
 # Tray, restitutions of beads and walls.
 _TRUTHS = ((1, 0.89, 0.97), (1, 0.7, 0.92), (3, 0.89, 0.97))
-_CYCLES = 60
+_CYCLES = 40
 _FRAMES, _FIRST, _EVERY, _ERROR = 600, 1.75, 3, 0.02
 _ENDS = np.array([0.025, 0.5, 0.975])
 _PRIOR = PriorSettings()
