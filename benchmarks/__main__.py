@@ -45,6 +45,7 @@ ALL = (
     'turning_bodies',
     'packing',
     'rotation',
+    'friction',
     'engine',
     'engine_physics',
     'validation',

@@ -49,7 +49,7 @@ _NS = 1e9
 _PARTS = ((0.0, 4.0), (4.0, 8.0), (8.0, 14.0), (14.0, 21.0))
 _DELAY_NS = 1_750_000_000
 _ALONE = {'cooling.rebounds': False, 'cooling.collisions': False}
-_PRIOR = PriorSettings()
+_PRIOR = PriorSettings(min_wall_restitution=0.8)
 _TRAY_KNOWN = replace(
     _PRIOR,
     floor_lid_spread=0.0,

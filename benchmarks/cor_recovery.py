@@ -204,7 +204,7 @@ def _by_the_law(case: _Case) -> tuple[str, str]:
 
 def _drawn_from_priors(case: _Range) -> tuple[str, str]:
     tray = load_trays()[case.tray]
-    prior = PriorSettings()
+    prior = PriorSettings(min_wall_restitution=0.8)
     library = library_of(tray)
     tables = tables_of(library, tray, prior)
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)

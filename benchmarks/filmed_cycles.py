@@ -159,7 +159,7 @@ def _filled(
     if not math.isnan(film.pairs):
         values = {'restitution': film.pairs, 'wall_restitution': film.walls}
         return cells, dict.fromkeys(cells, with_values(common, values, 'benchmark'))
-    prior = PriorSettings()
+    prior = PriorSettings(min_wall_restitution=0.8)
     varied_cells, gases = {}, {}
     for number, cell in cells.items():
         random = np.random.default_rng([film.number, number])

@@ -118,7 +118,7 @@ def _video(tray: int, number: int) -> Path | None:
 def _draw(film: tuple[int, int]) -> None:
     """Draw the truth of a tray, and film it with a drawn camera."""
     number_of_tray, number = film
-    prior = PriorSettings()
+    prior = PriorSettings(min_wall_restitution=0.8)
     random = np.random.default_rng([number, number_of_tray])
     beads = random.uniform(*DRAWN_PAIRS)
     walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)

@@ -190,7 +190,7 @@ def read_cycles(number, roughness, cycles):
     noise = np.random.default_rng([number, cycles]).standard_normal((cycles, times.size))
     speeds = cooling_runs(settings, tray, times, range(cycles)).mean_projected_speed
     speeds = speeds * np.exp(_ERROR * noise)
-    prior = PriorSettings()
+    prior = PriorSettings(min_wall_restitution=0.8)
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
     decays = [decay_likelihood(tables, times, speed, _ERROR * speed, camera) for speed in speeds]

@@ -70,7 +70,7 @@ def _cycle(task: tuple[int, int]) -> _Cycle:
     (speed,) = cooling_runs(settings, tray, times, [run]).mean_projected_speed
     noise = np.random.default_rng([number, run]).standard_normal(speed.size)
     speed = speed * np.exp(_ERROR * noise)
-    prior = PriorSettings()
+    prior = PriorSettings(min_wall_restitution=0.8)
     library = library_of(tray)
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     tables = tables_of(library, tray, prior)
@@ -84,7 +84,7 @@ def _cycle(task: tuple[int, int]) -> _Cycle:
 
 
 def _posterior(tray: int, cycles: list[_Cycle], *, beads: bool, walls: bool) -> Posterior:
-    prior = PriorSettings()
+    prior = PriorSettings(min_wall_restitution=0.8)
     flown = load_trays()[tray]
     tables = tables_of(library_of(flown), flown, prior)
     decay, contacts = (reduce(add, terms) for terms in zip(*cycles, strict=True))

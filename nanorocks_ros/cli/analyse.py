@@ -63,7 +63,7 @@ def add_parser(commands: Any) -> None:
         dest='cooling.include_inconsistent',
         action='store_const',
         const='true',
-        help='count cycles flagged inconsistent in the means of all cycles',
+        help='count decays that contacts contradict, too, in the means of all cycles',
     )
     add_options(parser)
     parser.set_defaults(run=run)
@@ -143,9 +143,11 @@ def _print(analysis: Analysis) -> None:
 def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
     from nanorocks_ros.studies.analysis.cycle_words import (
         cycle_lines,
-        is_left_out,
+        is_decay_left_out,
+        prior_text,
         tray_reason,
         used_speeds,
+        wall_prior,
     )
     from nanorocks_ros.studies.analysis.results_json import (
         end_of_cycle,
@@ -157,17 +159,17 @@ def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
     if reason is not None:
         return [f'no COR: {reason.text}; {reason.remedy}']
     cycles = last_of_each_cycle(results.cors)
-    used = used_speeds(results.speeds, cycles, analysis.lowest_walls)
+    used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
     ends = ends_of_cycles(results.clusters)
-    lines: list[str] = []
+    lines = [prior_text(analysis.prior)]
     left_out = 0
     for cor in cycles:
-        is_out = is_left_out(cor, include_inconsistent=analysis.include_inconsistent)
+        is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)
         left_out += is_out
         lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
     mean = cycles[-1].mean_restitution
     if len(cycles) > 1 and math.isfinite(mean.value):
-        without = f', without {left_out} flagged inconsistent' if left_out else ''
+        without = f', without the decays of {left_out}' if left_out else ''
         lines.append(f'all cycles: COR {mean.value:.4f} +- {mean.error:.4f}{without}')
     if results.truth:
         truth = results.truth[-1]

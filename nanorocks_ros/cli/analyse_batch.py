@@ -166,6 +166,7 @@ def _print(batch: Batch, combined_results: Combined) -> None:
 
 
 def _tray_lines(tray: TrayMeans) -> list[str]:
+    from nanorocks_ros.records import headline_in_words
     from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
     values = means_as_json(tray)
@@ -175,14 +176,19 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         return _interval((value, low, high), factor, digits)
 
     lines = []
-    if values['restitution_lower'] is not None:
+    restitution = tray.restitution
+    if restitution is not None and values['restitution_lower'] is not None:
         walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
         count = values['cycles_read']
         lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
+        source = headline_in_words(
+            restitution.headline, restitution.tension, restitution.wall_friction
+        )
+        lines.append(f'from {source}')
     if tray.left_out:
         lines.append(
-            f'{counted(tray.left_out, "cycle")} flagged inconsistent left out of the '
-            'restitutions; pass --include-inconsistent to count'
+            f'the decays of {counted(tray.left_out, "cycle")} left out of the restitutions, since '
+            'contacts contradict them; pass --include-inconsistent to count'
         )
     for name, label, factor, unit in (
         ('cycle_restitution', 'COR of a cycle', 1.0, ''),

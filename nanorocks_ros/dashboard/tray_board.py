@@ -19,9 +19,11 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
     GroundTruth,
+    Headline,
     Quality,
     SpeedEstimate,
 )
+from nanorocks_ros.records.headlines import reason_for_contacts
 from nanorocks_ros.records.result_words import flags_in_words, reason_of
 from nanorocks_ros.wire.flat_records import flat_names, flat_value
 from nanorocks_ros.wire.products import CURVES
@@ -255,6 +257,8 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
         elements[name] = value
     if isinstance(record, CorEstimate) and (reason := reason_of(record)) is not None:
         elements['reason'] = reason.text
+    if isinstance(record, CorEstimate) and record.headline is Headline.CONTACTS:
+        elements['headline_reason'] = reason_for_contacts(record.tension, record.wall_friction)
     return elements
 
 

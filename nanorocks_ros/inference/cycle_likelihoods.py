@@ -5,7 +5,7 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,14 @@ import numpy as np
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
-from nanorocks_ros.records import UNKNOWN, UNKNOWN_MEASURED_INTERVAL, MeasuredInterval
+from nanorocks_ros.records import (
+    UNKNOWN,
+    UNKNOWN_MEASURED,
+    UNKNOWN_MEASURED_INTERVAL,
+    Headline,
+    Measured,
+    MeasuredInterval,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,12 +45,15 @@ class CycleLikelihoods:
     contacts : ContactTerms or None
     by_form : tuple of (float, float)
         From the closed form: restitution and error of each cycle.
+    by_contacts : int
+        Cycles of which only the contacts are part.
     """
 
     cycles: int
     decay: DecayLikelihood | None = None
     contacts: ContactTerms | None = None
     by_form: tuple[tuple[float, float], ...] = ()
+    by_contacts: int = 0
 
     def __add__(self, other: CycleLikelihoods) -> CycleLikelihoods:
         return CycleLikelihoods(
@@ -51,12 +61,26 @@ class CycleLikelihoods:
             decay=self.decay + other.decay if self.decay and other.decay else None,
             contacts=self.contacts + other.contacts if self.contacts and other.contacts else None,
             by_form=self.by_form + other.by_form,
+            by_contacts=self.by_contacts + other.by_contacts,
         )
+
+    def without_decay(self) -> CycleLikelihoods:
+        """The contacts alone, with a decay that says nothing."""
+        if self.decay is None:
+            return self
+        nothing = {
+            field.name: np.zeros_like(getattr(self.decay, field.name))
+            for field in fields(self.decay)
+            if field.name != 'samples'
+        }
+        decay = replace(self.decay, **nothing, samples=0)
+        return replace(self, decay=decay, by_contacts=self.cycles)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All fields as arrays, for a file; derivatives in single precision."""
         content: dict[str, NDArray[Any]] = {
             'cycles': np.array(self.cycles),
+            'by_contacts': np.array(self.by_contacts),
             'by_form': np.array(self.by_form, dtype=np.float64).reshape(-1, 2),
         }
         if self.decay is None or self.contacts is None:
@@ -111,8 +135,10 @@ class CycleLikelihoods:
                     collisions=int(arrays['contacts.collisions']),
                     walls=arrays['contacts.walls'],
                     beads=arrays['contacts.beads'],
+                    friction=arrays['contacts.friction'],
                 ),
                 by_form=by_form,
+                by_contacts=int(arrays['by_contacts']),
             )
         except (KeyError, ValueError, IndexError, TypeError) as error:
             raise FitError(where, 'holds no evidence of cycles', _NOT_THERE) from error
@@ -132,6 +158,11 @@ class MeanRestitution:
     tension : float
         Standard deviations by which decays, rebounds and collisions disagree.
     rebounds, collisions : int
+    by_contacts : int
+        Cycles that enter with their contacts alone.
+    headline : Headline
+        Source of both restitutions, as of a cycle.
+    wall_friction : Measured
     """
 
     cycles: int
@@ -140,3 +171,6 @@ class MeanRestitution:
     tension: float = UNKNOWN
     rebounds: int = 0
     collisions: int = 0
+    by_contacts: int = 0
+    headline: Headline = Headline.UNKNOWN
+    wall_friction: Measured = UNKNOWN_MEASURED

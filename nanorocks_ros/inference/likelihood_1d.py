@@ -16,9 +16,43 @@ if TYPE_CHECKING:
 
 # Smallest number of points at which a likelihood is evaluated for a convolution.
 _SMEARED = 1000
+# Points of a posterior, and the depth below the maximum at which a second grid ends.
+_FINE, _DEPTH = 2001, 18.0
 # Terms of a sum below exp(-this) of the largest are left out: all of them together do not change
 # the last digit.
 _LOST = 45.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posterior1D:
+    """Probability of one restitution, on an even grid.
+
+    Parameters
+    ----------
+    restitution : ndarray (n,)
+    probability : ndarray (n,)
+        Sums to 1.
+    """
+
+    restitution: NDArray[np.float64]
+    probability: NDArray[np.float64]
+
+    @property
+    def mean(self) -> float:
+        """Mean."""
+        return float(self.probability @ self.restitution)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return math.sqrt(float(self.probability @ (self.restitution - self.mean) ** 2))
+
+    def quantiles(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Quantiles, each entry extending half way to its neighbours."""
+        axis = self.restitution
+        edges = np.concatenate(([axis[0]], 0.5 * (axis[1:] + axis[:-1]), [axis[-1]]))
+        below = np.concatenate(([0.0], np.cumsum(self.probability)))
+        return np.asarray(np.interp(probabilities, below / below[-1], edges))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +73,36 @@ class Likelihood1D:
         """The log likelihood at other rising restitutions, (n,)."""
         slopes = spline_slopes(self.restitution, self.log_likelihood)
         return spline_at(self.restitution, self.log_likelihood, slopes, restitution)
+
+    def shifted(self, offset: float) -> Likelihood1D:
+        """The likelihood where all measurements read too low by an offset, which may be 0."""
+        if offset == 0.0:
+            return self
+        first, last = self.restitution[[0, -1]]
+        places = np.clip(self.restitution - offset, first, last)
+        return Likelihood1D(restitution=self.restitution, log_likelihood=self.at(places))
+
+    def posterior(self, prior: tuple[float, float]) -> Posterior1D:
+        """The posterior for a flat prior.
+
+        Parameters
+        ----------
+        prior : tuple of 2 floats
+            Its ends, within the range of the likelihood; equal if the restitution is known.
+        """
+        low, high = prior
+        if low == high:
+            return Posterior1D(restitution=np.array([low]), probability=np.ones(1))
+        for _ in range(2):
+            fine = np.linspace(low, high, _FINE)
+            less = self.at(fine)
+            less -= less.max()
+            likely = np.flatnonzero(less > -_DEPTH)
+            low = float(fine[max(likely[0] - 1, 0)])
+            high = float(fine[min(likely[-1] + 1, fine.size - 1)])
+        weight = np.exp(less)
+        weight[[0, -1]] *= 0.5
+        return Posterior1D(restitution=fine, probability=weight / weight.sum())
 
     def convolved(self, spread: float) -> Likelihood1D:
         """Convolution with a Gaussian: the likelihood with a common systematic error."""

@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING, TypeVar
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
-from nanorocks_ros.records import CorEstimate, CorStatus, GroundTruth, SpeedEstimate
+from nanorocks_ros.records import (
+    CorEstimate,
+    CorStatus,
+    GroundTruth,
+    SpeedEstimate,
+    headline_in_words,
+)
 from nanorocks_ros.studies.figures.demo_figure import cooling_figure
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
@@ -110,7 +116,9 @@ class DemoNode(NanorocksNode):
         print(
             f'walls {final.wall_restitution.value:.3f} [{final.wall_restitution.lower:.3f}, '
             f"{final.wall_restitution.upper:.3f}]; the paper's closed form says "
-            f'{final.paper_restitution:.3f}; see docs/method/restitution.md'
+            f'{final.paper_restitution:.3f}; from '
+            f'{headline_in_words(final.headline, final.tension, final.wall_friction)}; '
+            'see docs/method/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 

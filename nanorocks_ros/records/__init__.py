@@ -19,6 +19,9 @@ from nanorocks_ros.records.frames import MotionMask as MotionMask
 from nanorocks_ros.records.frames import Notice as Notice
 from nanorocks_ros.records.frames import TrayImage as TrayImage
 from nanorocks_ros.records.frames import TrayState as TrayState
+from nanorocks_ros.records.headlines import Headline as Headline
+from nanorocks_ros.records.headlines import headline_in_words as headline_in_words
+from nanorocks_ros.records.headlines import headline_of as headline_of
 from nanorocks_ros.records.quality_flags import NOTHING_WRONG as NOTHING_WRONG
 from nanorocks_ros.records.quality_flags import UNKNOWN as UNKNOWN
 from nanorocks_ros.records.quality_flags import CorRelation as CorRelation

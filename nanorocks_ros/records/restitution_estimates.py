@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nanorocks_ros.records.headlines import Headline
 from nanorocks_ros.records.quality_flags import (
     NOTHING_WRONG,
     UNKNOWN,
@@ -35,8 +36,8 @@ class CorEstimate:
     relation : CorRelation
         What turned the decay into a restitution.
     restitution : Interval, 0 to 1
-        Of two beads: median of what is probable, and interval; statistical only for
-        ``CorRelation.PAPER``.
+        Of two beads, by the source that `headline` says: median of what is probable, and
+        interval; statistical only for ``CorRelation.PAPER``.
     initial_speed : Measured, [m/s]
         Mean projected speed at `cooling_start`, from the fit.
     haff_time : Measured, [s]
@@ -72,6 +73,18 @@ class CorEstimate:
         whose species were told apart, once the cycle is over.
     species_haff_times : tuple of Measured, at most 2, [s]
         As `haff_time`, of each species.
+    headline : Headline
+        Source of `restitution` and `wall_restitution`: decay and contacts together where they
+        agree, contacts alone where they do not or walls rub.
+    joint_restitution, joint_wall_restitution : Interval, 0 to 1
+        By decay and contacts together, whether they agree or not.
+    decay_restitution, decay_wall_restitution : Interval, 0 to 1
+        By the decay alone.
+    contact_restitution, contact_wall_restitution : Interval, 0 to 1
+        By collisions and rebounds alone.
+    wall_friction : Measured
+        Coefficient of friction of the side walls, at least, from the tangential speeds of
+        rebounds.
     """
 
     stamp_ns: int
@@ -98,3 +111,11 @@ class CorEstimate:
     mean_wall_restitution: Measured = UNKNOWN_MEASURED
     species_initial_speeds: tuple[Measured, ...] = ()
     species_haff_times: tuple[Measured, ...] = ()
+    headline: Headline = Headline.UNKNOWN
+    joint_restitution: Interval = UNKNOWN_INTERVAL
+    joint_wall_restitution: Interval = UNKNOWN_INTERVAL
+    decay_restitution: Interval = UNKNOWN_INTERVAL
+    decay_wall_restitution: Interval = UNKNOWN_INTERVAL
+    contact_restitution: Interval = UNKNOWN_INTERVAL
+    contact_wall_restitution: Interval = UNKNOWN_INTERVAL
+    wall_friction: Measured = UNKNOWN_MEASURED

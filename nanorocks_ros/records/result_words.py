@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.records.cluster_estimates import sizes_disagree
+from nanorocks_ros.records.headlines import Headline, reason_for_contacts
 from nanorocks_ros.records.quality_flags import (
     CorRelation,
     CorStatus,
@@ -93,8 +94,8 @@ FLAGS = {
     Quality.INCONSISTENT: Words(
         'decay, rebounds and collisions contradict each other: something happens that is not '
         'simulated, such as friction, sticking or drag',
-        'do not use the restitutions of this cycle; compare contacts and decay with '
-        '--cooling-rebounds false and --cooling-collisions false',
+        'the restitutions are those of contacts alone; compare decay_restitution and '
+        'contact_restitution',
     ),
     Quality.DOUBTFUL_SCALE: Words(
         'rulers of the scale (told, radii, contacts, walls) differ by more than 2 %; a notice '
@@ -153,25 +154,35 @@ def size_flag(autocorrelation: MeasuredInterval, tracks: Measured) -> FlagWords 
     )
 
 
-def wall_flag(walls: Interval, lowest: float) -> FlagWords | None:
-    """A flag where the walls are at the lower end of their prior; None else.
+class WallPrior(NamedTuple):
+    """Ends of the flat prior of the walls, and from where on decays were simulated."""
 
-    Parameters
-    ----------
-    walls : Interval
-        Restitution of the walls.
-    lowest : float
-        Lower end of the flat prior.
-    """
+    lowest: float = 0.0
+    highest: float = 1.0
+    simulated: float = 0.0
+
+
+def wall_flag(cor: CorEstimate, prior: WallPrior) -> FlagWords | None:
+    """A flag where the walls lean on an end of their prior, with its name; None else."""
+    walls = cor.wall_restitution
+    low, high = prior.lowest, prior.highest
+    name, remedy = 'prior.min_wall_restitution', 'lower --prior-min-wall-restitution'
+    if cor.headline is not Headline.CONTACTS and prior.simulated > low:
+        low, name = prior.simulated, 'the lowest for which decays were simulated'
+        remedy = 'use contacts, film closer or at a higher rate, or give the walls by both ends,'
     # A likelihood that falls from the edge on, flat, half-normal or exponential, puts the lower
     # quantile of 0.025 at 0.03, 0.014, 0.007 of the upper one; with its peak inside, it is more.
-    if not walls.lower - lowest < _AT_EDGE * (walls.upper - lowest):
+    if walls.lower - low < _AT_EDGE * (walls.upper - low):
+        place = f'{low:g} ({name})'
+    elif high < 1.0 and high - walls.upper < _AT_EDGE * (high - walls.lower):
+        place = f'{high:g} (prior.max_wall_restitution)'
+        remedy = 'raise --prior-max-wall-restitution'
+    else:
         return None
     return FlagWords(
         'wall_limit',
-        f'the walls are at the lowest restitution that is allowed, {lowest:g}; those of the '
-        'beads make up for it',
-        'lower --prior-min-wall-restitution if such walls are possible',
+        f'the walls are at an end of what is allowed, {place}; those of the beads make up for it',
+        f'{remedy} if such walls are possible',
     )
 
 
@@ -193,6 +204,13 @@ def reason_of(cor: CorEstimate) -> Words | None:
             'film longer; where beads stick early pass --cooling-until-merge false',
         )
     contacts = f'{cor.rebounds} rebounds and {cor.collisions} collisions'
+    if cor.headline is Headline.CONTACTS:
+        why = reason_for_contacts(cor.tension, cor.wall_friction)
+        return Words(
+            f'only contacts count{", since " if why else ""}{why}, and {contacts} tell too little '
+            'of the beads',
+            'film more cycles, longer, and closer or at a higher rate',
+        )
     if math.isnan(cor.reduced_chi_square):
         return Words(
             'the speeds are those of grains, whose bias is not known, and no contact was seen',

@@ -73,8 +73,8 @@ class CoolingSettings:
     )
     include_inconsistent: bool = setting(
         False,
-        'count cycles flagged inconsistent, whose decay and contacts contradict each other, in '
-        'the means of all cycles',
+        'count the decays of cycles whose decay and contacts disagree, too, in the means of all '
+        'cycles; their contacts always count',
     )
     update_interval: float = setting(
         0.5, 'time between two live estimates', 's', low=0.0, high=60.0
@@ -90,10 +90,11 @@ class PriorSettings:
     """Priors of the restitutions of beads and walls, and systematic errors."""
 
     min_wall_restitution: float = setting(
-        0.8,
-        'lower end of the flat prior of the wall restitution',
+        0.5,
+        'lower end of the flat prior of the wall restitution; decays were simulated from 0.78, so '
+        'that lower ones are told by rebounds alone',
         deprecated='wall_low',
-        low=0.78,
+        low=0.5,
         high=1.0,
     )
     max_wall_restitution: float = setting(

@@ -16,6 +16,7 @@ from nanorocks_ros.records import (
     NS,
     CorRelation,
     CorStatus,
+    Headline,
     Quality,
     RecordType,
     SizeStatus,
@@ -37,6 +38,7 @@ _ENUMERATIONS = {
     'quality': Quality,
     'status': CorStatus,
     'relation': CorRelation,
+    'headline': Headline,
     'size_status': SizeStatus,
     'sticking_status': StickingStatus,
 }

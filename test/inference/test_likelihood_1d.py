@@ -22,3 +22,35 @@ def test_the_convolution_equals_the_full_sum(width, spread):
     apart = (fine - NODES[:, np.newaxis]) / spread
     whole = logsumexp(CubicSpline(NODES, logs)(fine) - 0.5 * apart**2, axis=1)
     np.testing.assert_allclose(term.log_likelihood, whole, rtol=1e-12, atol=1e-12)
+
+
+def gaussian(mean, spread):
+    return Likelihood1D(
+        restitution=NODES, log_likelihood=-0.5 * ((NODES - mean) / spread) ** 2 - 7.0
+    )
+
+
+@pytest.mark.parametrize('spread', [0.0004, 0.01])
+def test_the_posterior_of_a_gaussian_is_that_gaussian(spread):
+    posterior = gaussian(0.9, spread).posterior((0.78, 1.0))
+    assert posterior.mean == pytest.approx(0.9, abs=1e-3 * spread)
+    assert posterior.deviation == pytest.approx(spread, rel=1e-2)
+    lower, upper = posterior.quantiles(np.array([0.025, 0.975]))
+    assert (lower, upper) == pytest.approx(
+        (0.9 - 1.96 * spread, 0.9 + 1.96 * spread), abs=spread / 50
+    )
+
+
+def test_a_prior_cuts_the_posterior_and_a_known_restitution_is_a_point():
+    cut = gaussian(0.9, 0.01).posterior((0.9, 1.0))
+    assert cut.quantiles(np.array([0.0]))[0] == pytest.approx(0.9)
+    assert cut.mean == pytest.approx(0.9 + 0.01 * np.sqrt(2.0 / np.pi), rel=1e-3)
+    known = gaussian(0.9, 0.01).posterior((0.97, 0.97))
+    assert (known.mean, known.deviation) == (0.97, 0.0)
+    assert known.quantiles(np.array([0.025, 0.975])).tolist() == [0.97, 0.97]
+
+
+def test_a_shift_moves_the_likelihood_up():
+    moved = gaussian(0.9, 0.01).shifted(0.02).posterior((0.78, 1.0))
+    assert moved.mean == pytest.approx(0.92, abs=1e-5)
+    assert gaussian(0.9, 0.01).shifted(0.0).posterior((0.78, 1.0)).mean == pytest.approx(0.9)

@@ -21,6 +21,7 @@ from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
     GroundTruth,
+    Headline,
     Interval,
     Measured,
     MeasuredInterval,
@@ -269,6 +270,8 @@ def test_every_array_starts_with_time_and_cycle_and_holds_the_whole_record(recor
 )
 def test_the_constants_are_those_of_the_code(record_type, enumerations):
     expected = {member.name: member.value for kind in enumerations for member in kind}
+    if record_type is CorEstimate:
+        expected |= {f'HEADLINE_{member.name}': member.value for member in Headline}
     assert layout(record_type).constants == expected
 
 

@@ -15,7 +15,7 @@ from nanorocks_ros.records import (
     MeasuredInterval,
     Merge,
 )
-from nanorocks_ros.wire.flat_records import flat_value, nested_fields
+from nanorocks_ros.wire.flat_records import flat_names, flat_value, nested_fields
 
 COR = CorEstimate(
     stamp_ns=0,
@@ -60,7 +60,7 @@ def test_species_that_are_not_known_are_left_out_only_at_the_end():
         for value in ('initial_speed', 'haff_time')
         for error in ('', '_error')
     )
-    numbers = dict.fromkeys(names, math.nan)
+    numbers = dict.fromkeys((*flat_names(CorEstimate), *names), math.nan)
     for value in ('initial_speed', 'haff_time', 'mean_restitution', 'mean_wall_restitution'):
         numbers |= {value: 1.0, f'{value}_error': 0.1}
     for value in ('restitution', 'wall_restitution'):

@@ -154,7 +154,7 @@ function drawCor({ latest: { cor }, start, finals }) {
   bounds.textContent = words.interval(cor.restitution_lower, cor.restitution_upper, words.restitution);
   const note = document.createElement('small');
   const contacts = cor.rebounds + cor.collisions;
-  note.textContent = words.corState(cor) + (contacts ? `, with ${contacts} single contacts` : '');
+  note.textContent = words.corState(cor) + words.source(cor, contacts);
   shown.classList.remove('awaited-value');
   shown.replaceChildren(`${words.restitution(cor.restitution)} `, bounds, note);
 }

@@ -48,6 +48,13 @@ const COR_STATES = {
 
 export const corState = (cor) => COR_STATES[cor.status] ?? String(cor.status);
 
+/** What the headline is from, and what the decay alone says where contacts contradict it. */
+export function source(cor, contacts) {
+  if (cor.headline !== 'contacts') return contacts ? `, with ${contacts} single contacts` : '';
+  const decay = known(cor.decay_restitution) ? ` (the decay says ${restitution(cor.decay_restitution)})` : '';
+  return `, from ${contacts} contacts alone, since ${cor.headline_reason}${decay}`;
+}
+
 /** Whether an estimate is one, and not only what is probable before anything is known. */
 export const saysSomething = (cor) => !!cor && known(cor.restitution) && ['cooling', 'final'].includes(cor.status);
 

@@ -36,9 +36,10 @@ VERTICAL_RATIOS = (0.25, 0.4, 0.6, 0.9, 1.3)
 RADIUS_ERRORS = (-0.02, 0.0, 0.02, 0.04, 0.06)
 """Glass beads of 12 px came out 4 % too large in films with all effects."""
 
-# Factors by which the true errors of rebounds may exceed the stated ones. Not below 1: many slow
-# rebounds, whose stated errors are too large, would then give the few fast ones too much weight.
-_ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
+ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
+"""Factors by which the true errors of rebounds may exceed the stated ones. Not below 1: many slow
+rebounds, whose stated errors are too large, would then give the few fast ones too much weight."""
+
 # The same factor for collisions, from the scatter of simulated cycles. It is fixed, since
 # collisions cannot separate errors from vertical speeds.
 _PAIR_ERRORS = 1.25
@@ -90,7 +91,7 @@ def rebound_table(
     grid = checked_grid('wall_restitution', wall_restitution)
     _check_share(outliers)
     if not rebounds:
-        return np.zeros((len(_ERROR_SCALES), grid.size))
+        return np.zeros((len(ERROR_SCALES), grid.size))
     columns = np.array(
         [
             (rebound.incoming.value, rebound.outgoing.value, rebound.incoming.error,
@@ -104,7 +105,7 @@ def rebound_table(
     square = (outgoing - grid * incoming) ** 2 / variance
     outlier_density = outliers / (RANGE * incoming)
     by_scale = []
-    for scale in _ERROR_SCALES:
+    for scale in ERROR_SCALES:
         density = np.exp(-0.5 * square / scale**2) / (_SQRT_2_PI * scale * np.sqrt(variance))
         by_scale.append(np.log((1.0 - outliers) * density + outlier_density).sum(axis=0))
     return np.array(by_scale)

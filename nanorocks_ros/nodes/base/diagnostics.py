@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.records import CorEstimate, SpeedEstimate, TrayImage
+from nanorocks_ros.records import CorEstimate, Headline, SpeedEstimate, TrayImage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -95,6 +95,8 @@ class Diagnostics:
             self.values[f'tray {record.tray} speed'] = speed
         if isinstance(record, CorEstimate):
             cor = f'{record.restitution.value:.4f} {record.status.name.lower()}'
+            if record.headline is Headline.CONTACTS:
+                cor += ' by contacts alone'
             self.values[f'tray {record.tray} COR'] = cor
 
     def publish(self, missing_publishers: Sequence[str]) -> None:

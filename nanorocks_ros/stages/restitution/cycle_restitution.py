@@ -11,6 +11,7 @@ from nanorocks_ros.records import (
     UNKNOWN,
     UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
+    Headline,
     Interval,
     Measured,
 )
@@ -34,6 +35,11 @@ class CycleRestitution:
     reduced_chi_square, paper_restitution, tension : float
     rebounds, collisions : int
     mean_restitution, mean_wall_restitution : Measured
+    headline : Headline
+    joint_restitution, joint_wall_restitution : Interval
+    decay_restitution, decay_wall_restitution : Interval
+    contact_restitution, contact_wall_restitution : Interval
+    wall_friction : Measured
     """
 
     determined: bool = False
@@ -49,3 +55,11 @@ class CycleRestitution:
     tension: float = UNKNOWN
     mean_restitution: Measured = UNKNOWN_MEASURED
     mean_wall_restitution: Measured = UNKNOWN_MEASURED
+    headline: Headline = Headline.UNKNOWN
+    joint_restitution: Interval = UNKNOWN_INTERVAL
+    joint_wall_restitution: Interval = UNKNOWN_INTERVAL
+    decay_restitution: Interval = UNKNOWN_INTERVAL
+    decay_wall_restitution: Interval = UNKNOWN_INTERVAL
+    contact_restitution: Interval = UNKNOWN_INTERVAL
+    contact_wall_restitution: Interval = UNKNOWN_INTERVAL
+    wall_friction: Measured = UNKNOWN_MEASURED

@@ -264,6 +264,14 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
                 mean_wall_restitution=result.mean_wall_restitution,
                 species_initial_speeds=initial_speeds,
                 species_haff_times=haff_times,
+                headline=result.headline,
+                joint_restitution=result.joint_restitution,
+                joint_wall_restitution=result.joint_wall_restitution,
+                decay_restitution=result.decay_restitution,
+                decay_wall_restitution=result.decay_wall_restitution,
+                contact_restitution=result.contact_restitution,
+                contact_wall_restitution=result.contact_wall_restitution,
+                wall_friction=result.wall_friction,
             ),
         )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from scipy import special
@@ -19,11 +19,17 @@ from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.inference.posterior import Posterior, check_walls, posterior_of
+from nanorocks_ros.inference.restitution_sources import (
+    RestitutionSources,
+    check_wall_prior,
+    intervals_of,
+    restitution_sources,
+)
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED,
     CorRelation,
+    Headline,
     Interval,
     Measured,
     MeasuredInterval,
@@ -115,6 +121,7 @@ class PaperMethod:
             self.evidence = self.evidence + own if self.evidence else own
         return CycleRestitution(
             determined=True,
+            headline=Headline.DECAY,
             restitution=Interval(value, lower, upper),
             paper_restitution=value,
             reduced_chi_square=fit.reduced_chi_square,
@@ -168,9 +175,8 @@ class DecayLibraryMethod:
             False: (scale, prior.speed_bias),
             True: (math.hypot(scale, prior.grain_scale_error), prior.grain_speed_bias),
         }
-        self._biases = (prior.collision_bias, prior.rebound_bias)
-        self._walls = (prior.min_wall_restitution, prior.max_wall_restitution)
-        check_walls(self._walls)
+        self._prior = prior
+        check_wall_prior((prior.min_wall_restitution, prior.max_wall_restitution))
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self._include_inconsistent = settings.cooling.include_inconsistent
@@ -191,44 +197,49 @@ class DecayLibraryMethod:
             self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
         )
         integrated = likelihood.integrated()
-        posterior = self._posterior(integrated, contacts)
+        sources = self._sources(integrated, contacts)
         best = int(np.argmax(integrated))
         result = replace(
             self._speeds(decay, final=final),
+            **_by_source(sources, self._ends),
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
-            tension=posterior.tension,
             reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         )
-        if not math.sqrt(posterior.covariance[0, 0]) > _LARGEST_DEVIATION:
-            restitution, wall_restitution = _intervals(posterior, self._ends)
+        restitution, wall_restitution = sources.intervals(self._ends)
+        if sources.means[0].error <= _LARGEST_DEVIATION:
             result = replace(
                 result,
                 determined=True,
                 restitution=restitution,
                 wall_restitution=wall_restitution,
-                correlation=_correlation(posterior),
+                correlation=sources.correlation,
             )
-        counts = self._include_inconsistent or not posterior.tension > LARGEST_TENSION
-        mean, wall_mean = self._means(likelihood, contacts, final=final and counts)
+        elif sources.headline is Headline.CONTACTS:
+            # Rebounds determine the walls even where nothing is known of the beads.
+            result = replace(result, wall_restitution=wall_restitution)
+        trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
+        mean, wall_mean = self._means(likelihood, contacts, final=final, trusted=trusted)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
 
-    def _posterior(self, integrated: NDArray[np.float64], contacts: ContactTerms) -> Posterior:
-        return posterior_of(
-            self._tables,
-            integrated,
-            self._walls,
-            bead_likelihood=contacts.bead_likelihood(self._biases[0]),
-            wall_likelihood=contacts.wall_likelihood(self._biases[1]),
+    def _sources(
+        self, integrated: NDArray[np.float64], contacts: ContactTerms, *, decays: int = 1
+    ) -> RestitutionSources:
+        return restitution_sources(
+            self._tables, integrated, contacts, self._prior, decay_counts=decays > 0
         )
 
     def _means(
-        self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool
+        self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool, trusted: bool
     ) -> tuple[Measured, Measured]:
-        """Mean restitutions of beads and of walls, of all finished cycles and one that counts."""
+        """Mean restitutions of beads and of walls, of all finished cycles.
+
+        A cycle whose decay is not trusted counts with its contacts.
+        """
         if not final:
             return self._means_so_far
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)
+        own = own if trusted else own.without_decay()
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
         self._means_so_far = _measured(mean.restitution), _measured(mean.wall_restitution)
@@ -253,20 +264,23 @@ class DecayLibraryMethod:
                 'cycles were not read by this library of decays',
                 'analyse their recordings again',
             )
-        posterior = self._posterior(decay.integrated(), contacts)
-        error, wall_error = np.sqrt(np.diag(posterior.covariance)).tolist()
-        restitution, wall_restitution = _intervals(posterior, self._ends)
+        decays = evidence.cycles - evidence.by_contacts
+        sources = self._sources(decay.integrated(), contacts, decays=decays)
+        intervals, means = sources.intervals(self._ends), sources.means
+        restitution, wall_restitution = (
+            MeasuredInterval(mean.value, mean.error, interval.lower, interval.upper)
+            for mean, interval in zip(means, intervals, strict=True)
+        )
         return MeanRestitution(
             cycles=evidence.cycles,
-            restitution=MeasuredInterval(
-                posterior.mean[0], error, restitution.lower, restitution.upper
-            ),
-            wall_restitution=MeasuredInterval(
-                posterior.mean[1], wall_error, wall_restitution.lower, wall_restitution.upper
-            ),
-            tension=posterior.tension,
+            by_contacts=evidence.by_contacts,
+            restitution=restitution,
+            wall_restitution=wall_restitution,
+            tension=sources.joint.tension,
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
+            headline=sources.headline,
+            wall_friction=sources.wall_friction,
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> CycleRestitution:
@@ -290,17 +304,22 @@ class DecayLibraryMethod:
         )
 
 
-def _intervals(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
-    """The restitution of two beads, and of beads and walls."""
-    lower, value, upper = (float(quantile) for quantile in posterior.quantiles(ends))
-    wall_lower, wall, wall_upper = (float(quantile) for quantile in posterior.wall_quantiles(ends))
-    return Interval(value, lower, upper), Interval(wall, wall_lower, wall_upper)
-
-
-def _correlation(posterior: Posterior) -> float:
-    spread = posterior.covariance
-    product = math.sqrt(spread[0, 0] * spread[1, 1])
-    return float(spread[0, 1]) / product if product > 0.0 else 0.0
+def _by_source(sources: RestitutionSources, ends: NDArray[np.float64]) -> dict[str, Any]:
+    """The fields of a `CycleRestitution` that say what each source makes of the cycle."""
+    joint, joint_walls = intervals_of(sources.joint, ends)
+    decay, decay_walls = intervals_of(sources.decay, ends)
+    contacts, contact_walls = sources.contact_intervals(ends)
+    return {
+        'headline': sources.headline,
+        'tension': sources.joint.tension,
+        'joint_restitution': joint,
+        'joint_wall_restitution': joint_walls,
+        'decay_restitution': decay,
+        'decay_wall_restitution': decay_walls,
+        'contact_restitution': contacts,
+        'contact_wall_restitution': contact_walls,
+        'wall_friction': sources.wall_friction,
+    }
 
 
 def _measured(mean: MeasuredInterval) -> Measured:

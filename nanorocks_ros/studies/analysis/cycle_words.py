@@ -7,13 +7,15 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.records import NS, CorStatus, Quality, SpeedMethod
+from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
+from nanorocks_ros.records import NS, CorStatus, Headline, SpeedMethod, headline_in_words
 from nanorocks_ros.records.result_words import (
     METHODS,
     NO_SHAKING,
     NO_SPEEDS,
     RELATIONS,
     FlagWords,
+    WallPrior,
     Words,
     fitted,
     flags_in_words,
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from nanorocks_ros.records import ClusterEstimate, CorEstimate, Interval, SpeedEstimate
+    from nanorocks_ros.settings import PriorSettings
     from nanorocks_ros.studies.analysis.offline_analysis import TrayResults
 
 _MM = 1e3
@@ -41,21 +44,23 @@ class UsedSpeeds:
     methods : Counter of SpeedMethod
     flags : Counter of str
         Speeds with each flag, by name.
-    lowest_walls : float
-        Lower end of the prior of their restitution.
+    walls : WallPrior
+        Prior of the restitution of the walls.
     """
 
     methods: Counter[SpeedMethod] = field(default_factory=Counter)
     flags: Counter[str] = field(default_factory=Counter)
-    lowest_walls: float = 0.0
+    walls: WallPrior = field(default_factory=WallPrior)
 
 
 def used_speeds(
-    speeds: Iterable[SpeedEstimate], cycles: Iterable[CorEstimate], lowest_walls: float = 0.0
+    speeds: Iterable[SpeedEstimate],
+    cycles: Iterable[CorEstimate],
+    walls: WallPrior | None = None,
 ) -> dict[int, UsedSpeeds]:
     """The speeds in the window of each cycle, by its number; the speeds are read once."""
     windows = {cor.cycle: (cor.window_start, cor.window_end) for cor in cycles}
-    used = {cycle: UsedSpeeds(lowest_walls=lowest_walls) for cycle in windows}
+    used = {cycle: UsedSpeeds(walls=walls or WallPrior()) for cycle in windows}
     for speed in speeds:
         if speed.cycle not in windows or speed.cycle_start_ns is None:
             continue
@@ -68,11 +73,29 @@ def used_speeds(
     return used
 
 
-def is_left_out(cor: CorEstimate, *, include_inconsistent: bool) -> bool:
-    """Whether a cycle is not counted in the means of all cycles."""
+def wall_prior(prior: PriorSettings) -> WallPrior:
+    """What is assumed of the walls."""
+    return WallPrior(prior.min_wall_restitution, prior.max_wall_restitution, LOWEST_WALL)
+
+
+def prior_text(prior: PriorSettings) -> str:
+    """The priors of both restitutions and of the larger systematic errors, for the terminal."""
+    low, high = prior.min_wall_restitution, prior.max_wall_restitution
+    walls = f'{low:g} to {high:g}' if low < high else f'{low:g}, known'
+    simulated = f' (decays from {LOWEST_WALL:g})' if low < LOWEST_WALL else ''
     return (
-        cor.status is CorStatus.FINAL
-        and bool(cor.quality & Quality.INCONSISTENT)
+        f'priors: beads 0 to 1, walls {walls}{simulated}; common errors: scale '
+        f'{prior.scale_error:g}, collisions {prior.collision_bias:g}, rebounds '
+        f'{prior.rebound_bias:g}, diameter {prior.diameter_error:g}, height '
+        f'{_MM * prior.height_error:g} mm'
+    )
+
+
+def is_decay_left_out(cor: CorEstimate, *, include_inconsistent: bool) -> bool:
+    """Whether a cycle counts with its contacts alone in the means of all cycles."""
+    return (
+        cor.status in (CorStatus.FINAL, CorStatus.UNDETERMINED)
+        and cor.headline is Headline.CONTACTS
         and not include_inconsistent
     )
 
@@ -88,6 +111,8 @@ def cycle_as_json(
             for flag in _flags(cor, clusters, used)
         ],
         'reason': None if reason is None else reason._asdict(),
+        'headline': cor.headline.name.lower(),
+        'headline_reason': _headline(cor),
         'contacts': {'rebounds': cor.rebounds, 'collisions': cor.collisions},
         'methods': {method.name.lower(): number for method, number in used.methods.items()},
         'sticking': _sticking(clusters),
@@ -102,7 +127,7 @@ def _flags(
         None if clusters is None else size_flag(clusters.cluster_size, clusters.weighted_size)
     ]
     if reason_of(cor) is None:
-        others.append(wall_flag(cor.wall_restitution, used.lowest_walls))
+        others.append(wall_flag(cor, used.walls))
     return [*flags_in_words(cor.quality), *(flag for flag in others if flag is not None)]
 
 
@@ -140,6 +165,7 @@ def cycle_lines(
     reason = reason_of(cor)
     if reason is not None:
         lines.append(f'  reason: {reason.text}; {reason.remedy}')
+    lines += _source_lines(cor)
     lines += _decay_lines(cor)
     if cor.samples:
         lines.append(f'  used: {_used_text(cor, used)}')
@@ -152,21 +178,53 @@ def cycle_lines(
         name = flag.name.replace('_', ' ')
         lines.append(f'  flag {name}{part}: {flag.text}; {flag.remedy}')
     if left_out:
-        lines.append('  left out of all cycles; pass --include-inconsistent to count it')
+        lines.append(
+            '  the decay is left out of all cycles; pass --include-inconsistent to count it'
+        )
     return lines
 
 
 def _cor_text(cor: CorEstimate) -> str:
     state = cor.status.name.lower()
-    if reason_of(cor) is not None:
-        return f'COR unknown ({state.replace("_", " ")})'
     walls = ''
     if math.isfinite(cor.wall_restitution.value):
         walls = f', walls {_interval(cor.wall_restitution, 3)}'
+    if reason_of(cor) is not None:
+        return f'COR unknown{walls} ({state.replace("_", " ")})'
     return (
         f'COR {_interval(cor.restitution, 4)}{walls} '
         f'({cor.relation.name.lower()}, {state}: {RELATIONS[cor.relation]})'
     )
+
+
+def _headline(cor: CorEstimate) -> str:
+    return headline_in_words(cor.headline, cor.tension, cor.wall_friction)
+
+
+def _source_lines(cor: CorEstimate) -> list[str]:
+    """What each source says, where there is more than one."""
+    if cor.headline not in (Headline.JOINT, Headline.CONTACTS):
+        return []
+    sources = (
+        ('decay', cor.decay_restitution, cor.decay_wall_restitution),
+        ('contacts', cor.contact_restitution, cor.contact_wall_restitution),
+        ('both', cor.joint_restitution, cor.joint_wall_restitution),
+    )
+    parts = [
+        f'{name} {_known_interval(beads, 3)}, walls {_known_interval(walls, 3)}'
+        for name, beads, walls in sources
+    ]
+    lines = [f'  from {_headline(cor)}', f'  alone: {"; ".join(parts)}']
+    if cor.wall_friction.known:
+        lines.append(
+            f'  friction of the walls: {cor.wall_friction.value:.4f} '
+            f'+- {cor.wall_friction.error:.4f}'
+        )
+    return lines
+
+
+def _known_interval(interval: Interval, digits: int) -> str:
+    return _interval(interval, digits) if math.isfinite(interval.value) else 'unknown'
 
 
 def _interval(interval: Interval, digits: int) -> str:

@@ -22,6 +22,7 @@ from nanorocks_ros.records import (
     Rebound,
     SpeedEstimate,
 )
+from nanorocks_ros.settings import PriorSettings
 from nanorocks_ros.studies.analysis.bag_images import PreprocessedFrames, open_camera
 from nanorocks_ros.wire.products import MEASURED, is_measured
 
@@ -145,9 +146,9 @@ class Analysis:
     metadata : dict of str to str
         Provenance that the recording holds.
     include_inconsistent : bool
-        Whether cycles flagged inconsistent are counted in the means.
-    lowest_walls : float
-        Lower end of the prior of the restitution of the walls.
+        Whether decays that contacts contradict are counted in the means.
+    prior : PriorSettings
+        Priors of the restitutions, and systematic errors.
     """
 
     epoch_ns: int
@@ -159,7 +160,7 @@ class Analysis:
     refused: int = 0
     metadata: dict[str, str] = field(default_factory=dict)
     include_inconsistent: bool = False
-    lowest_walls: float = 0.0
+    prior: PriorSettings = field(default_factory=PriorSettings)
 
     @property
     def frames(self) -> int:
@@ -229,7 +230,7 @@ def analyse(
         complete=bag.reader.complete,
         metadata=bag.reader.metadata,
         include_inconsistent=settings.cooling.include_inconsistent,
-        lowest_walls=settings.prior.min_wall_restitution,
+        prior=settings.prior,
     )
     frames = PreprocessedFrames(bag, pipeline.preprocessor)
     for shot in frames.shots(progress):

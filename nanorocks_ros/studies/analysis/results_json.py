@@ -5,15 +5,17 @@ Tested by ``test/studies/analysis/test_results_folder.py``.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import NS, ClusterEstimate, CorEstimate, CorStatus
 from nanorocks_ros.studies.analysis.cycle_words import (
     cycle_as_json,
-    is_left_out,
+    is_decay_left_out,
     tray_reason,
     used_speeds,
+    wall_prior,
 )
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.flat_records import flat_value
@@ -32,6 +34,12 @@ _SPEEDS = (
     'first_species_speed',
     'second_species_speed',
 )
+BY_SOURCE = tuple(
+    field.name
+    for field in layout(CorEstimate).fields
+    if field.name.startswith(('joint_', 'decay_', 'contact_', 'wall_friction'))
+)
+"""Restitutions by each source; those without a source are of the one that `headline` names."""
 _RESTITUTIONS = (
     *('initial_speed', 'initial_speed_error', 'haff_time', 'haff_time_error'),
     *('restitution', 'restitution_lower', 'restitution_upper'),
@@ -39,6 +47,7 @@ _RESTITUTIONS = (
     *('correlation', 'paper_restitution'),
     *('mean_restitution', 'mean_restitution_error'),
     *('mean_wall_restitution', 'mean_wall_restitution_error'),
+    *BY_SOURCE,
 )
 _SPECIES_DECAYS = tuple(
     field.name for field in layout(CorEstimate).fields if '_species_' in field.name
@@ -91,6 +100,7 @@ def as_json(analysis: Analysis, *, series: bool = True) -> dict[str, Any]:
         'seconds': analysis.seconds,
         'complete': analysis.complete,
         'notices': list(analysis.notices),
+        'priors': asdict(analysis.prior),
         'trays': {
             str(number): _tray_as_json(analysis, results, series=series)
             for number, results in analysis.trays.items()
@@ -108,7 +118,7 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
         if speed.stamp_ns in wanted
     }
     ends = ends_of_cycles(results.clusters)
-    used = used_speeds(results.speeds, cycles, analysis.lowest_walls)
+    used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
     reason = tray_reason(results)
     return {
         **(_series_as_json(results, epoch_ns) if series else {}),
@@ -123,8 +133,8 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
             }
             for estimate in cycles
         ],
-        'cycles_left_out': sum(
-            is_left_out(estimate, include_inconsistent=analysis.include_inconsistent)
+        'decays_left_out': sum(
+            is_decay_left_out(estimate, include_inconsistent=analysis.include_inconsistent)
             for estimate in cycles
         ),
         'reason': None if reason is None else reason._asdict(),

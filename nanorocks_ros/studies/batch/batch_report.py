@@ -99,14 +99,16 @@ def _restitutions(together: Combined) -> Section:
         title='Restitution of all cycles together',
         parts=[
             Table(
-                head=('tray', 'cycles', 'left out', 'beads', 'walls', 'rebounds', 'collisions',
-                      'tension'),
+                head=('tray', 'cycles', 'decays left out', 'source', 'beads', 'walls', 'rebounds',
+                      'collisions', 'tension'),
                 rows=[_together(tray) for tray in _known(together)],
                 caption='What decays, rebounds and collisions of all cycles say together. What is '
                 'not known of tray, camera and start is the same in all of them: it is part of '
                 'the interval, and does not become less with more cycles. A dash: hardly known. '
-                'A tension beyond 3 means that something happens that is not simulated; such '
-                'cycles are left out, unless cooling.include_inconsistent is set.',
+                'Source: joint, decays and contacts together; contacts, where decays disagree '
+                'with them (a tension beyond 2) or walls rub: then something happens that is not '
+                'simulated. Decays of such cycles are left out, unless '
+                'cooling.include_inconsistent is set; their contacts count.',
             ),
             Table(
                 head=('tray', 'COR of a cycle', "by the paper's closed form", 'v0 [mm/s]',
@@ -139,7 +141,8 @@ def _together(tray: TrayMeans) -> tuple[str, ...]:
     return (
         str(tray.tray),
         str(values['cycles_read']),
-        str(values['cycles_left_out']),
+        str(values['decays_left_out']),
+        values['headline'] or '–',
         _interval(values, 'restitution'),
         _interval(values, 'wall_restitution'),
         str(values['rebounds']),

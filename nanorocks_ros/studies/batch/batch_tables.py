@@ -12,6 +12,7 @@ import numpy as np
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 from nanorocks_ros.records import CorEstimate
+from nanorocks_ros.studies.analysis.results_json import BY_SOURCE
 from nanorocks_ros.studies.batch.campaign_means import Combined, means_as_json
 from nanorocks_ros.wire.array_layouts import layout
 
@@ -30,12 +31,13 @@ _UNITS = {
     'sticking_speed_lower': 'm/s',
     'sticking_speed_upper': 'm/s',
 }
-_TEXTS = 'recording', 'status', 'relation', 'sticking_status'
+_TEXTS = 'recording', 'status', 'relation', 'headline', 'sticking_status'
 _WHOLE = 'tray', 'cycle', 'quality', 'samples', 'rebounds', 'collisions'
 _CYCLE = (
     *('recording', 'tray', 'cycle', 'start', 'status', 'relation', 'samples', 'quality'),
     *('restitution', 'restitution_lower', 'restitution_upper'),
     *('wall_restitution', 'wall_restitution_lower', 'wall_restitution_upper', 'correlation'),
+    *('headline', *BY_SOURCE),
     *('paper_restitution', 'initial_speed', 'initial_speed_error'),
     *('haff_time', 'haff_time_error', 'reduced_chi_square'),
     *('window_start', 'window_end', 'cooling_start', 'rebounds', 'collisions', 'tension'),

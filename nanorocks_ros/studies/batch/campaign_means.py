@@ -19,7 +19,7 @@ from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.pipeline.composition import TrayStages, trays_of
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED_INTERVAL,
-    CorStatus,
+    Headline,
     Measured,
     MeasuredInterval,
     Quality,
@@ -82,7 +82,7 @@ class TrayMeans:
     means : dict of str to Mean
         Of `MEANS`.
     left_out : int
-        Cycles that are not counted in the restitutions, since they are flagged inconsistent.
+        Cycles whose decays are not counted in the restitutions, since contacts contradict them.
     """
 
     tray: int
@@ -164,7 +164,7 @@ def combined(
             restitution=mean,
             sticking=stages.clusters.together(sticking.get(number, [])),
             means={name: _mean(_counted(own, name, settings), name) for name in MEANS},
-            left_out=len(own) - len(_counted(own, 'cycle_restitution', settings)),
+            left_out=mean.by_contacts if mean else 0,
         )
     return Combined(
         trays=trays,
@@ -213,15 +213,14 @@ def _rows(result: BagResults, column: str) -> Iterable[CycleRow]:
 def _counted(
     rows: Sequence[CycleRow], name: str, settings: PipelineSettings
 ) -> Sequence[CycleRow]:
-    """The cycles of a mean: for restitutions without those flagged inconsistent."""
-    if settings.cooling.include_inconsistent or 'restitution' not in name:
+    """The cycles of a mean: for the closed form without decays that contacts contradict."""
+    if settings.cooling.include_inconsistent or name != 'paper_restitution':
         return rows
-    final = CorStatus.FINAL.name.lower()
-    return [
-        row
-        for row in rows
-        if row.values['status'] != final or not row.values['quality'] & Quality.INCONSISTENT
-    ]
+    return [row for row in rows if not _by_contacts(row)]
+
+
+def _by_contacts(row: CycleRow) -> bool:
+    return bool(row.values['headline'] == Headline.CONTACTS.name.lower())
 
 
 def _mean(rows: Sequence[CycleRow], name: str) -> Mean:
@@ -321,7 +320,10 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
         **_interval_as_json('restitution', restitution),
         **_interval_as_json('wall_restitution', wall_restitution),
         'cycles_read': mean.cycles if mean else 0,
-        'cycles_left_out': tray.left_out,
+        'decays_left_out': tray.left_out,
+        'headline': mean.headline.name.lower() if mean else None,
+        'wall_friction': finite_or_none(mean.wall_friction.value) if mean else None,
+        'wall_friction_error': finite_or_none(mean.wall_friction.error) if mean else None,
         'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
         'collisions': mean.collisions if mean else 0,

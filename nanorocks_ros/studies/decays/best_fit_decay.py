@@ -20,6 +20,7 @@ from nanorocks_ros.inference.decay.decay_likelihood import (
 )
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.posterior import posterior_of
+from nanorocks_ros.inference.restitution_sources import decay_walls
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def library_decay(
     together = reduce(add, likelihoods)
     integrated = together.integrated()
     posterior = posterior_of(
-        tables, integrated, (prior.min_wall_restitution, prior.max_wall_restitution)
+        tables, integrated, decay_walls((prior.min_wall_restitution, prior.max_wall_restitution))
     )
     ends = np.array([0.5, 0.5 - _HALF, 0.5 + _HALF])
     beads, walls = posterior.quantiles(ends), posterior.wall_quantiles(ends)

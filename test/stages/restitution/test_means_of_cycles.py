@@ -1,4 +1,4 @@
-"""Cycles flagged inconsistent do not enter the means, unless asked."""
+"""Decays that contacts contradict do not enter the means, unless asked; their contacts do."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.physics.haff_law import haff_speed
-from nanorocks_ros.records import CorStatus, Measured, Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import (
+    CorStatus,
+    Headline,
+    Measured,
+    Quality,
+    SpeedEstimate,
+    SpeedMethod,
+)
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
@@ -44,22 +51,34 @@ def final_estimates(*, include):
     """Two cycles that agree; between them one that cools more slowly than rebounds allow."""
     settings = with_values(PipelineSettings(), {'cooling.include_inconsistent': include}, 'test')
     stage = RestitutionEstimator(settings, load_trays()[1])
-    finals = []
-    for cycle, haff_time, wall in ((1, 6.0, 0.985), (2, 20.0, 0.82), (3, 6.0, 0.985)):
+    last = {}
+    for cycle, haff_time, wall in ((1, 3.0, 0.82), (2, 20.0, 0.82), (3, 3.0, 0.82)):
         records = [*speeds(cycle, haff_time), *rebounds(cycle, wall)]
         for record in sorted(records, key=lambda item: item.stamp_ns):
-            finals += [cor for cor in stage.push(record) if cor.status is CorStatus.FINAL]
-    return [*finals, *stage.flush()]
+            last |= {cor.cycle: cor for cor in stage.push(record)}
+    last |= {cor.cycle: cor for cor in stage.flush()}
+    return [last[cycle] for cycle in (1, 2, 3)]
 
 
 @pytest.mark.parametrize('include', [False, True])
-def test_an_inconsistent_cycle_enters_the_mean_only_when_asked(include):
+def test_a_decay_that_contacts_contradict_enters_the_mean_only_when_asked(include):
     first, tense, last = final_estimates(include=include)
+    assert first.headline is last.headline is Headline.JOINT
     assert not first.quality & Quality.INCONSISTENT
     assert tense.quality & Quality.INCONSISTENT
-    assert not last.quality & Quality.INCONSISTENT
-    changed = tense.mean_restitution != first.mean_restitution
-    assert changed == include
-    # What the cycle itself says is not changed by that.
-    assert math.isfinite(tense.restitution.value)
-    assert last.mean_restitution != first.mean_restitution
+    # Rebounds alone tell the walls, and nothing tells the beads.
+    assert tense.headline is Headline.CONTACTS
+    assert tense.status is CorStatus.UNDETERMINED
+    assert tense.wall_restitution == tense.contact_wall_restitution
+    assert tense.wall_restitution.lower < 0.82 < tense.wall_restitution.upper
+    # All sources are given beside it.
+    assert math.isnan(tense.contact_restitution.value)
+    assert tense.joint_restitution.lower > first.restitution.upper
+    assert math.isfinite(tense.decay_restitution.value)
+    # Rebounds of all cycles count; the decay only when asked, and the mean is then tense, too.
+    assert tense.mean_wall_restitution.error < first.mean_wall_restitution.error
+    assert math.isnan(tense.mean_restitution.value) == include
+    if not include:
+        shift = tense.mean_restitution.value - first.mean_restitution.value
+        assert abs(shift) < first.mean_restitution.error
+        assert last.mean_restitution.error < first.mean_restitution.error

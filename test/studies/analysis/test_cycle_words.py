@@ -12,6 +12,7 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorRelation,
     CorStatus,
+    Headline,
     Interval,
     Measured,
     MeasuredInterval,
@@ -20,12 +21,14 @@ from nanorocks_ros.records import (
     SpeedMethod,
     StickingStatus,
 )
-from nanorocks_ros.records.result_words import FLAGS, flags_in_words, reason_of
+from nanorocks_ros.records.result_words import FLAGS, WallPrior, flags_in_words, reason_of
+from nanorocks_ros.settings import PriorSettings
 from nanorocks_ros.studies.analysis.cycle_words import (
     UsedSpeeds,
     cycle_as_json,
     cycle_lines,
-    is_left_out,
+    is_decay_left_out,
+    prior_text,
     tray_reason,
     used_speeds,
 )
@@ -114,11 +117,25 @@ def test_numbers_that_the_fit_does_not_know_are_not_printed(speed_error, time, t
 
 
 def test_an_inconsistent_cycle_is_flagged_with_its_tension_and_left_out():
-    cor = replace(FINAL, quality=Quality.INCONSISTENT, tension=5.06)
-    assert is_left_out(cor, include_inconsistent=False)
-    assert not is_left_out(cor, include_inconsistent=True)
-    assert not is_left_out(FINAL, include_inconsistent=False)
+    cor = replace(
+        FINAL,
+        quality=Quality.INCONSISTENT,
+        tension=5.06,
+        headline=Headline.CONTACTS,
+        decay_restitution=Interval(0.62, 0.5, 0.7),
+        decay_wall_restitution=Interval(0.85, 0.8, 0.9),
+        contact_restitution=FINAL.restitution,
+        contact_wall_restitution=FINAL.wall_restitution,
+        wall_friction=Measured(0.031, 0.008),
+    )
+    assert is_decay_left_out(cor, include_inconsistent=False)
+    assert not is_decay_left_out(cor, include_inconsistent=True)
+    assert not is_decay_left_out(FINAL, include_inconsistent=False)
     text = text_of(cor, left_out=True)
+    assert 'from contacts alone, since decay and contacts differ by 5.1' in text
+    assert 'friction of 0.031 +- 0.008' in text
+    assert 'decay 0.620 [0.500, 0.700], walls 0.850' in text
+    assert 'both unknown' in text
     assert 'flag inconsistent' in text
     assert '5.1 standard deviations' in text
     assert '--include-inconsistent' in text
@@ -217,23 +234,48 @@ def test_clusters_by_the_autocorrelation_that_the_tracks_contradict_are_flagged(
 )
 def test_walls_at_the_edge_of_what_is_allowed_are_flagged(walls, flagged):
     cor = replace(FINAL, wall_restitution=walls)
-    flags = cycle_as_json(cor, None, UsedSpeeds(lowest_walls=0.8))['flags']
+    flags = cycle_as_json(cor, None, UsedSpeeds(walls=WallPrior(lowest=0.8)))['flags']
     assert [flag['name'] for flag in flags] == ['wall_limit'] * flagged
 
 
+@pytest.mark.parametrize(
+    ('headline', 'walls', 'edge'),
+    [
+        (Headline.JOINT, Interval(0.782, 0.7801, 0.80), 'the lowest for which decays'),
+        (Headline.CONTACTS, Interval(0.782, 0.7801, 0.80), None),
+        (Headline.CONTACTS, Interval(0.51, 0.5001, 0.53), '0.5 (prior.min_wall_restitution)'),
+        (Headline.JOINT, Interval(0.945, 0.93, 0.9499), '0.95 (prior.max_wall_restitution)'),
+    ],
+)
+def test_the_flag_names_the_edge_that_the_walls_lean_on(headline, walls, edge):
+    prior = WallPrior(lowest=0.5, highest=0.95, simulated=0.78)
+    cor = replace(FINAL, wall_restitution=walls, headline=headline)
+    flags = cycle_as_json(cor, None, UsedSpeeds(walls=prior))['flags']
+    assert len(flags) == (edge is not None)
+    assert edge is None or edge in flags[0]['text']
+
+
+def test_the_priors_are_told():
+    text = prior_text(PriorSettings())
+    assert 'walls 0.5 to 1 (decays from 0.78)' in text
+    known = replace(PriorSettings(), min_wall_restitution=0.97, max_wall_restitution=0.97)
+    assert 'walls 0.97, known' in prior_text(known)
+
+
 def test_the_json_says_the_same_as_the_terminal():
-    cor = replace(FINAL, quality=Quality.INCONSISTENT | Quality.GLARE)
+    cor = replace(FINAL, quality=Quality.INCONSISTENT | Quality.GLARE, headline=Headline.CONTACTS)
     values = cycle_as_json(cor, CLUSTERS, UsedSpeeds())
     assert json.loads(json.dumps(values, allow_nan=False)) == values
     assert [flag['name'] for flag in values['flags']] == ['glare', 'inconsistent']
     assert [flag['text'] for flag in values['flags']] == [
         words.text for words in flags_in_words(cor.quality)
     ]
+    assert (values['headline'], values['headline_reason']) == ('contacts', 'contacts alone')
     assert values['contacts'] == {'rebounds': 20, 'collisions': 31}
     assert values['reason'] is None
     assert values['sticking'].startswith('beads stick below 3.1 mm/s')
     results = TrayResults([speed(2.0 + k) for k in range(19)])
     results.add(cor)
     tray = as_json(Analysis(epoch_ns=0, trays={1: results}))['trays']['1']
-    assert tray['cycles_left_out'] == 1
+    assert tray['decays_left_out'] == 1
     assert tray['cycles'][0]['flags'] == [{**flag, 'speeds': None} for flag in values['flags']]

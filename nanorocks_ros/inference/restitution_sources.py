@@ -1,0 +1,182 @@
+"""Restitutions from the decay, from contacts and from both, and which of them can be trusted.
+
+The likelihood of the decay holds for smooth spheres in a vacuum. Contacts test it: where they
+contradict it, or show that walls rub, only the contacts are believed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.inference.contacts.contact_terms import LOWEST_REBOUND
+from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
+from nanorocks_ros.inference.posterior import Posterior, posterior_of
+from nanorocks_ros.records import (
+    UNKNOWN_INTERVAL,
+    UNKNOWN_MEASURED,
+    Headline,
+    Interval,
+    Measured,
+    headline_of,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+    from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+    from nanorocks_ros.inference.likelihood_1d import Posterior1D
+    from nanorocks_ros.settings import PriorSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestitutionSources:
+    """What decay and contacts say about both restitutions, alone and together.
+
+    Parameters
+    ----------
+    joint, decay : Posterior
+    beads, walls : Posterior1D or None
+        From collisions and from rebounds alone; None without any.
+    wall_friction : Measured
+    headline : Headline
+    """
+
+    joint: Posterior
+    decay: Posterior
+    beads: Posterior1D | None
+    walls: Posterior1D | None
+    wall_friction: Measured
+    headline: Headline
+
+    def contact_intervals(self, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
+        """Of beads and walls by contacts alone; unknown without contacts of the kind."""
+        return _interval(self.beads, ends), _interval(self.walls, ends)
+
+    def intervals(self, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
+        """Of beads and walls by the source of the headline.
+
+        Parameters
+        ----------
+        ends : ndarray (3,)
+            Probabilities of lower end, value and upper end.
+        """
+        if self.headline is Headline.CONTACTS:
+            return self.contact_intervals(ends)
+        return intervals_of(self.joint, ends)
+
+    @property
+    def means(self) -> tuple[Measured, Measured]:
+        """Mean and standard deviation of beads and walls by the source of the headline."""
+        if self.headline is Headline.CONTACTS:
+            return _mean(self.beads), _mean(self.walls)
+        errors = np.sqrt(np.diag(self.joint.covariance)).tolist()
+        beads, walls = zip(self.joint.mean, errors, strict=True)
+        return Measured(*beads), Measured(*walls)
+
+    @property
+    def correlation(self) -> float:
+        """Of both restitutions by the source of the headline; contacts have none."""
+        spread = self.joint.covariance
+        product = math.sqrt(spread[0, 0] * spread[1, 1])
+        if self.headline is Headline.CONTACTS or not product > 0.0:
+            return 0.0
+        return float(spread[0, 1]) / product
+
+
+def restitution_sources(
+    tables: DecayTables,
+    log_likelihood: NDArray[np.float64],
+    contacts: ContactTerms,
+    prior: PriorSettings,
+    *,
+    decay_counts: bool = True,
+) -> RestitutionSources:
+    """Restitutions by each source.
+
+    Parameters
+    ----------
+    tables : DecayTables
+    log_likelihood : ndarray (n_places,)
+        Of the decay, on the grid of the tables.
+    contacts : ContactTerms
+    prior : PriorSettings
+    decay_counts : bool
+        False where the log likelihood holds no decay that can be trusted.
+
+    Raises
+    ------
+    ConfigurationError
+        For a wall prior outside the range of the library.
+    """
+    walls = prior.min_wall_restitution, prior.max_wall_restitution
+    simulated_walls = decay_walls(walls)
+    bead_likelihood = contacts.bead_likelihood(prior.collision_bias)
+    wall_likelihood = contacts.wall_likelihood(prior.rebound_bias)
+    joint = posterior_of(
+        tables,
+        log_likelihood,
+        simulated_walls,
+        bead_likelihood=bead_likelihood,
+        wall_likelihood=wall_likelihood,
+    )
+    number = contacts.rebounds + contacts.collisions
+    friction = contacts.wall_friction
+    headline = headline_of(number, joint.tension, friction)
+    if number and not decay_counts:
+        headline = Headline.CONTACTS
+    if headline is Headline.CONTACTS:
+        wall_likelihood = contacts.rubbed_wall_likelihood(prior.rebound_bias)
+    return RestitutionSources(
+        joint=joint,
+        decay=posterior_of(tables, log_likelihood, simulated_walls) if number else joint,
+        beads=bead_likelihood.posterior((0.0, 1.0)) if bead_likelihood else None,
+        walls=wall_likelihood.posterior(walls) if wall_likelihood else None,
+        wall_friction=friction,
+        headline=headline,
+    )
+
+
+def check_wall_prior(walls: tuple[float, float]) -> None:
+    """Refuse a prior of the walls beyond rebounds, or without a decay that was simulated.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    low, high = walls
+    if not LOWEST_REBOUND <= low <= high <= 1.0 or high < LOWEST_WALL:
+        raise ConfigurationError(
+            'prior.min_wall_restitution, prior.max_wall_restitution',
+            f'{low:g} to {high:g}',
+            f'give a range within {LOWEST_REBOUND:g} to 1 that ends above {LOWEST_WALL:g}, from '
+            'which on decays were simulated',
+        )
+
+
+def decay_walls(walls: tuple[float, float]) -> tuple[float, float]:
+    """The part of a prior of the walls for which decays were simulated."""
+    return max(walls[0], LOWEST_WALL), walls[1]
+
+
+def intervals_of(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
+    """The restitution of two beads, and of beads and walls; `ends` as for the sources."""
+    lower, value, upper = posterior.quantiles(ends).tolist()
+    wall_lower, wall, wall_upper = posterior.wall_quantiles(ends).tolist()
+    return Interval(value, lower, upper), Interval(wall, wall_lower, wall_upper)
+
+
+def _interval(posterior: Posterior1D | None, ends: NDArray[np.float64]) -> Interval:
+    if posterior is None:
+        return UNKNOWN_INTERVAL
+    lower, value, upper = posterior.quantiles(ends).tolist()
+    return Interval(value, lower, upper)
+
+
+def _mean(posterior: Posterior1D | None) -> Measured:
+    return UNKNOWN_MEASURED if posterior is None else Measured(posterior.mean, posterior.deviation)

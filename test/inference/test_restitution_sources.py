@@ -1,0 +1,103 @@
+"""Decay, contacts and both are told apart, and the headline is the source to be trusted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from wall_rebounds import wall_rebounds
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay.decay_library_file import library_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.restitution_sources import check_wall_prior, restitution_sources
+from nanorocks_ros.records import Headline, Measured, headline_in_words, headline_of
+from nanorocks_ros.settings import PriorSettings, SimulationSettings
+from nanorocks_ros.simulation.ensemble import cooling_runs
+
+TRAY = load_trays()[1]
+PRIOR = PriorSettings()
+ENDS = np.array([0.025, 0.5, 0.975])
+TIMES = np.arange(1.75, 20.0, 0.1)
+
+
+@pytest.fixture(scope='module')
+def tables():
+    return tables_of(library_of(TRAY), TRAY, PRIOR)
+
+
+def decay(tables, restitution, wall):
+    settings = SimulationSettings(restitution=restitution, wall_restitution=wall, seed=9)
+    (speed,) = cooling_runs(settings, TRAY, TIMES, [1]).mean_projected_speed
+    likelihood = decay_likelihood(tables, TIMES, speed, 0.02 * speed, (0.014, 0.01))
+    return likelihood.integrated()
+
+
+def rebounds(wall, n=60):
+    return ContactTerms.of(list(wall_rebounds(np.random.default_rng(1), n, 2.0, 17.0, wall)))
+
+
+def test_where_decay_and_contacts_agree_both_count(tables):
+    sources = restitution_sources(tables, decay(tables, 0.89, 0.97), rebounds(0.97), PRIOR)
+    assert sources.headline is Headline.JOINT
+    beads, walls = sources.intervals(ENDS)
+    assert beads.lower < 0.89 < beads.upper
+    assert walls.lower < 0.97 < walls.upper
+    assert sources.correlation < 0.0
+    # The decay alone is that without contacts.
+    alone = restitution_sources(tables, decay(tables, 0.89, 0.97), ContactTerms.of(()), PRIOR)
+    assert alone.headline is Headline.DECAY
+    assert alone.intervals(ENDS)[0].lower == pytest.approx(
+        float(sources.decay.quantiles(ENDS)[0]), abs=1e-12
+    )
+    assert alone.beads is alone.walls is None
+
+
+def test_where_they_do_not_only_the_contacts_count(tables):
+    sources = restitution_sources(tables, decay(tables, 0.95, 1.0), rebounds(0.82), PRIOR)
+    assert sources.headline is Headline.CONTACTS
+    beads, walls = sources.intervals(ENDS)
+    assert math.isnan(beads.value)
+    assert walls.lower < 0.82 < walls.upper
+    assert sources.correlation == 0.0
+    assert sources.means[1].value == pytest.approx(0.82, abs=0.02)
+
+
+def test_walls_below_the_simulated_decays_are_told_by_rebounds(tables):
+    sources = restitution_sources(tables, decay(tables, 0.89, 0.97), rebounds(0.6), PRIOR)
+    assert sources.headline is Headline.CONTACTS
+    walls = sources.intervals(ENDS)[1]
+    assert walls.lower < 0.6 < walls.upper < 0.65
+    assert sources.joint.wall_restitution[0] >= 0.78
+
+
+def test_a_decay_that_does_not_count_leaves_the_contacts(tables):
+    nothing = np.zeros(tables.mean.shape[0])
+    sources = restitution_sources(tables, nothing, rebounds(0.97), PRIOR, decay_counts=False)
+    assert sources.headline is Headline.CONTACTS
+
+
+@pytest.mark.parametrize(
+    ('contacts', 'tension', 'friction', 'expected', 'words'),
+    [
+        (0, 0.0, Measured(), Headline.DECAY, 'decay alone'),
+        (9, 1.9, Measured(0.002, 0.002), Headline.JOINT, 'decay and contacts together'),
+        (9, 2.1, Measured(), Headline.CONTACTS, 'differ by 2.1 standard deviations'),
+        (9, 0.5, Measured(0.01, 0.004), Headline.CONTACTS, 'a friction of 0.010 +- 0.004'),
+        (9, 0.5, Measured(-0.01, 0.004), Headline.JOINT, 'decay and contacts together'),
+    ],
+)
+def test_the_headline_and_its_reason(contacts, tension, friction, expected, words):
+    headline = headline_of(contacts, tension, friction)
+    assert headline is expected
+    assert words in headline_in_words(headline, tension, friction)
+
+
+@pytest.mark.parametrize('walls', [(0.4, 1.0), (0.5, 0.7), (0.95, 0.9), (0.9, 1.1)])
+def test_priors_without_rebounds_or_decays_are_refused(walls):
+    with pytest.raises(ConfigurationError, match=r'give a range within 0.5 to 1'):
+        check_wall_prior(walls)
