@@ -155,15 +155,11 @@ def rescale_errors(
     """
     duration = row[9]
     squared_path = (row[3] * row[3] + row[4] * row[4]) * duration * duration
-    lengths = math.sqrt(squared_path) / correlation_length
-    decorrelated = lengths * lengths / (lengths * lengths + 1.0)
-    # Errors of many lengths average out: exponential correlations leave 24 / lengths of the
-    # square of one error in the squared difference of the ends.
-    averaged = 1.0 + lengths / 6.0
+    decorrelated = squared_path / (squared_path + correlation_length * correlation_length)
     tilt = shared_error / duration
     row[5] *= variance
     # The ends weigh most in a slope: one wave of the error along a flight tilts it by about this.
-    row[6] = variance * row[6] + decorrelated / averaged * 4.0 * tilt * tilt
+    row[6] = variance * row[6] + decorrelated * 4.0 * tilt * tilt
     row[7] /= variance
 
 
