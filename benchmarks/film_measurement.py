@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from benchmarks.place_errors import PlaceErrors, place_errors
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
@@ -69,8 +68,6 @@ class FilmResult:
         Of each species: beads seen over true beads, mean over frames.
     radii : tuple of float
         Of each species: median of the measured radii over the mean true one.
-    errors : tuple of PlaceErrors or None
-        Of each species: stated errors of places and radii over the true ones.
     """
 
     refusal: str = ''
@@ -81,7 +78,6 @@ class FilmResult:
     flagged_speeds: float = 0.0
     counts: tuple[float, ...] = ()
     radii: tuple[float, ...] = ()
-    errors: tuple[PlaceErrors | None, ...] = ()
 
     @property
     def final(self) -> CorEstimate | None:
@@ -153,7 +149,6 @@ class _Reading:
             flagged_speeds=self._flagged(speeds, epoch_ns),
             counts=self._counts(),
             radii=self._radii(epoch_ns),
-            errors=place_errors(self._film, self._tracks, epoch_ns),
         )
 
     def _keep(self, records: Iterable[Result], notices: list[str]) -> None:

@@ -41,8 +41,6 @@ class FilmTruth:
         Left, top, width and height of the floor; empty: in the middle of the picture.
     positions, velocities : ndarray (frames, beads, 2), [m], [m/s]
         From the corner of the floor, and relative to it.
-    heights : ndarray (frames, beads), [m]
-        Above the floor.
     radii : ndarray (beads,), [m]
     species : ndarray of int, (beads,)
     merges : ndarray (merges,), [s]
@@ -61,7 +59,6 @@ class FilmTruth:
     region: tuple[float, ...]
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
-    heights: NDArray[np.float64]
     radii: NDArray[np.float64]
     species: NDArray[np.int64]
     merges: NDArray[np.float64]
@@ -103,7 +100,6 @@ def read_truth(video: Path) -> FilmTruth:
         region=region,
         positions=arrays['P'][..., :2].astype(np.float64) - displacement[:, np.newaxis],
         velocities=arrays['V'][..., :2].astype(np.float64) - swing[:, np.newaxis],
-        heights=arrays['P'][..., 2].astype(np.float64),
         radii=arrays['rad'].astype(np.float64),
         species=arrays['sp'].astype(np.int64),
         merges=np.asarray(arrays['merges'], dtype=np.float64).reshape(-1, 3)[:, 0],

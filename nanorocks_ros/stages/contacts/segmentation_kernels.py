@@ -18,7 +18,6 @@ from nanorocks_ros.stages.contacts.line_fits import (
     write_line,
 )
 from nanorocks_ros.stages.contacts.residual_variance import ResidualVariance, add_flight
-from nanorocks_ros.stages.tracking.linking.track_store import ALIKE_RADII
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,6 +39,8 @@ _MIN_GAIN = 30.0
 # Smallest residual variance, relative to the stated one. Errors that a bead keeps over some pixels
 # bend its trajectory slightly; without this limit they would cut it into pieces.
 _MIN_VARIANCE = 0.25
+# Length over which light, shadow and outline displace a bead by the same amount, in radii.
+_SHARED_LENGTH = 0.5
 # Positions by which the best break may shift once the whole flight after it is known.
 _MAX_SHIFT = 2
 
@@ -278,7 +279,7 @@ def _write_jump(
     _write_line(buffer, slot, window_start, first, jump[:LINE_SIZE])
     _write_line(buffer, slot, first, end, jump[LINE_SIZE : 2 * LINE_SIZE])
     for line in (jump[:LINE_SIZE], jump[LINE_SIZE : 2 * LINE_SIZE]):
-        rescale_errors(line, variance, shared_error, ALIKE_RADII * radius)
+        rescale_errors(line, variance, shared_error, _SHARED_LENGTH * radius)
     jump[2 * LINE_SIZE] = buffer.times[slot, first - 1]
     jump[2 * LINE_SIZE + 1] = buffer.times[slot, first]
     jump[2 * LINE_SIZE + 2] = shared_error

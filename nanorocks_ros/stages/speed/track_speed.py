@@ -140,7 +140,7 @@ class TrackSpeed:
             flags |= Quality.FEW_BEADS
         path = 0.5 * mean.window * mean.mean_projected_speed
         too_short = self._grains and path < _LONG_ENOUGH * self._shortest_path
-        if too_short or not (mean.beyond_errors and self.reliability.told_apart):
+        if too_short or not self.reliability.told_apart:
             flags |= Quality.UNCERTAIN
         return (
             SpeedEstimate(

@@ -37,12 +37,10 @@ sometimes wrong by more than 20 %."""
 _NS = 1e9
 # Smallest displacement over the error of a coordinate: the noise then adds 2 % to the mean square.
 _MIN_NOISE_RATIO = 14.0
-# The same for all errors, which positions share for some time, such as those from patches of
-# chalk. Errors s that the ends of a path do not share make a speed from distances d in half and
-# whole windows 7/4 s^2 / d^2 too high: 2.7 %; longer paths lose as much by collisions. And the
-# ratio below which a speed is unreliable.
-_MIN_ERROR_RATIO = 8.0
-_RELIABLE_RATIO = 3.2
+# The same for errors that positions share for some time, such as those from patches of chalk; and
+# the part of it below which a speed is unreliable.
+_MIN_ERROR_RATIO = 4.0
+_RELIABLE_FACTOR = 0.8
 # Relative error of the mean over the share of lost beads: fast beads are lost more often. At
 # 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
 _LOSS_BIAS = 0.4
@@ -71,8 +69,6 @@ class MeanSpeed:
     reliable : bool
         Whether enough beads have tracks (where many are lost, others are linked wrongly), and
         displacements exceed the position errors.
-    beyond_errors : bool
-        Whether displacements exceed the position errors.
     """
 
     stamp_ns: int
@@ -82,7 +78,6 @@ class MeanSpeed:
     beads: int
     share: float
     reliable: bool
-    beyond_errors: bool
 
 
 def mean_speed(
@@ -180,7 +175,6 @@ def _mean_speed(
         beads=distances.whole_window.size,
         share=share,
         reliable=share >= RELIABLE_SHARE and distances.exceed_errors(),
-        beyond_errors=distances.exceed_errors(),
     )
 
 
@@ -200,7 +194,7 @@ class _Distances:
 
     def exceed_errors(self) -> bool:
         """Whether displacements exceed the position errors, such as those from rotating chalk."""
-        return self.square >= _RELIABLE_RATIO**2 * self.position_variance
+        return self.square >= (_RELIABLE_FACTOR * _MIN_ERROR_RATIO) ** 2 * self.position_variance
 
     def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
         half = 0.5 * (
@@ -217,7 +211,9 @@ class _Distances:
             0.5 * math.sqrt(_mean(bead_scatter * bead_scatter)) / math.sqrt(self.whole_window.size)
         )
         shared_error = self._shared_share() * half
-        error = math.hypot(noise_error * per_time, 0.5 * shortened, scatter, shared_error)
+        error = math.hypot(
+            noise_error * per_time, 0.5 * shortened, 0.8 * scatter, 0.5 * shared_error
+        )
         return max(half + shortened, 0.0), error
 
     def _shared_share(self) -> float:

@@ -67,7 +67,7 @@ def write_snapshot(
     n_tracks: int,
     time: float,
     walls: Walls,
-    scaling: tuple[float, float],
+    systematic: float,
     collisions: tuple[float, float],
     species: int,
     snapshot: TrackSnapshot,
@@ -80,9 +80,8 @@ def write_snapshot(
     tracks, n_tracks, time
         See `append_detections`.
     walls : Walls
-    scaling : tuple of 2 floats
-        Error of a seen position over that of its fit; and an error that all positions of a bead
-        share, [px].
+    systematic : float, [px]
+        Error that all positions of a bead share.
     collisions : tuple of 2 floats, [1/s], [px/s]
         Collision rate of a bead, and standard deviation of its change of velocity.
     species : int
@@ -95,7 +94,6 @@ def write_snapshot(
         Row after the last one.
     """
     rate, velocity_change = collisions
-    factor, systematic = scaling
     row = first
     for k in range(n_tracks):
         if tracks.hits[k] < CONFIRM_FRAMES:
@@ -104,7 +102,7 @@ def write_snapshot(
         seen = tracks.last_seen[k] == time
         if seen:
             x, y = tracks.positions[k, 0, 0], tracks.positions[k, 0, 1]
-            error = factor * tracks.errors[k, 0]
+            error = tracks.errors[k, 0]
         else:
             # Unseen collisions, uniformly distributed in time.
             dt = time - tracks.last_seen[k]
@@ -121,10 +119,8 @@ def write_snapshot(
             snapshot.velocities[row, axis] = line[3 + axis] if has_velocity else np.nan
         snapshot.velocity_errors[row] = math.sqrt(line[6]) if has_velocity else np.nan
         snapshot.radii[row] = tracks.radii[k]
-        # Residuals above the stated errors inflate that of the mean.
-        inflation = max(tracks.radius_squares[k] / max(tracks.hits[k] - 1, 1), 1.0)
         snapshot.radius_errors[row] = math.sqrt(
-            inflation / tracks.independent_weights[k] + MIN_RADIUS_VARIANCE
+            1.0 / tracks.radius_weights[k] + MIN_RADIUS_VARIANCE
         )
         row += 1
     return row
