@@ -30,7 +30,7 @@ from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
 from nanorocks_ros.stages.preprocess.plate_search import guess_plate
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.rectify import mix_weights, nodes_of, resample_color
-from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
+from nanorocks_ros.stages.preprocess.shaking.shake_detection import MotionMeter
 from nanorocks_ros.stages.preprocess.stabilise import TrayRegistration
 from nanorocks_ros.studies.calibration.plate_fit import fit_plate
 

@@ -20,7 +20,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.shaking_cycles import CycleFollower
+from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
 from nanorocks_ros.stages.speed.area_speed import AreaSpeed
 from nanorocks_ros.stages.speed.speed_selector import SpeedSelector

@@ -13,13 +13,15 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.wall_collisions import next_wall_event
 from nanorocks_ros.simulation.engine.event_queue import schedule
-from nanorocks_ros.simulation.engine.gas_drag import (
+from nanorocks_ros.simulation.engine.flight.gas_drag import (
     drag_rate,
     flight_time,
     is_dragged,
     position_at,
     velocity_at,
 )
+from nanorocks_ros.simulation.engine.flight.pair_times import square_of, wait_for_contact
+from nanorocks_ros.simulation.engine.flight.unequal_drag import wait_with_unequal_drag
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,
     FLAGS,
@@ -33,8 +35,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     State,
 )
 from nanorocks_ros.simulation.engine.integer_width import as_index, as_int64
-from nanorocks_ros.simulation.engine.pair_times import square_of, wait_for_contact
-from nanorocks_ros.simulation.engine.unequal_drag import wait_with_unequal_drag
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.collision.conservation_ledger import Vector

@@ -9,9 +9,9 @@ import numpy as np
 
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import kernel
+from nanorocks_ros.simulation.engine.flight.pair_times import minimum_image
 from nanorocks_ros.simulation.engine.gas_state import ORIGINAL, RADIUS, State, X, Y, Z
 from nanorocks_ros.simulation.engine.integer_width import as_int64
-from nanorocks_ros.simulation.engine.pair_times import minimum_image
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
-from nanorocks_ros.simulation.engine.gas_drag import flown_time, speed_left, spin_left, velocity_at
+from nanorocks_ros.simulation.engine.flight.gas_drag import (
+    flown_time,
+    speed_left,
+    spin_left,
+    velocity_at,
+)
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTS,

@@ -28,7 +28,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.clusters.background_removal import tray_contrast, tray_levels
-from nanorocks_ros.stages.preprocess.shaking_cycles import CycleFollower
+from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import NS, Frame, Notice, Quality, TrayImage
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
-from nanorocks_ros.stages.preprocess.shake_detection import PlateMeter
-from nanorocks_ros.stages.preprocess.shaking_cycles import HeldImages, ShakeCounter
+from nanorocks_ros.stages.preprocess.shaking.shake_detection import PlateMeter
+from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import HeldImages, ShakeCounter
 from nanorocks_ros.stages.preprocess.stabilise import shift_of_plate
 from nanorocks_ros.stages.preprocess.tray_crop import TrayCrop
 from nanorocks_ros.stages.preprocess.tray_position_check import position_problem
@@ -97,7 +97,7 @@ class Preprocessor:
         """The tray images of a frame; notices alone when it cannot be used.
 
         While the beginning of a cycle is undecided, images are held back; see
-        :mod:`nanorocks_ros.stages.preprocess.shaking_cycles`.
+        :mod:`nanorocks_ros.stages.preprocess.shaking.shaking_cycles`.
 
         Raises
         ------

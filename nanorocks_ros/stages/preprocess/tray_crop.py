@@ -20,7 +20,7 @@ from nanorocks_ros.stages.preprocess.rectify import (
     resample_color,
     resample_gray,
 )
-from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
+from nanorocks_ros.stages.preprocess.shaking.shake_detection import MotionMeter
 from nanorocks_ros.stages.preprocess.stabilise import Shift, TrayRegistration
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from nanorocks_ros.physics.crowded_grains import (
     persistence_length,
 )
 from nanorocks_ros.records import NS
-from nanorocks_ros.stages.preprocess.difference_noise import difference_power
+from nanorocks_ros.stages.preprocess.shaking.difference_noise import difference_power
 from nanorocks_ros.stages.speed.structure_function import ImagePair, Sample, StructureFunction
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.records import NS
-from nanorocks_ros.stages.preprocess.difference_noise import difference_power
+from nanorocks_ros.stages.preprocess.shaking.difference_noise import difference_power
 from nanorocks_ros.stages.speed.structure_calibration import StructureCalibration
 
 if TYPE_CHECKING:

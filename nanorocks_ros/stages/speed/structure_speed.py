@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import NS, Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
-from nanorocks_ros.stages.preprocess.difference_noise import NoiseMeter
+from nanorocks_ros.stages.preprocess.shaking.difference_noise import NoiseMeter
 from nanorocks_ros.stages.speed.crowded_structure_function import CrowdedGrains
 from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds

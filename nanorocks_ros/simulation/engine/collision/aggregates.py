@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
-from nanorocks_ros.simulation.engine.gas_drag import (
+from nanorocks_ros.simulation.engine.flight.gas_drag import (
     flown_time,
     is_dragged,
     joined_drag_rate,

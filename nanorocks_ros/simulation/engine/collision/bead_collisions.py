@@ -22,7 +22,13 @@ from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
     length,
 )
 from nanorocks_ros.simulation.engine.collision.friction import apply_pair_friction
-from nanorocks_ros.simulation.engine.gas_drag import is_dragged
+from nanorocks_ros.simulation.engine.flight.gas_drag import is_dragged
+from nanorocks_ros.simulation.engine.flight.pair_times import (
+    is_rounding,
+    minimum_image,
+    speed_square,
+)
+from nanorocks_ros.simulation.engine.flight.unequal_drag import is_apart, with_least_separation
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,
     COUNTER,
@@ -47,7 +53,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     record_collision,
 )
 from nanorocks_ros.simulation.engine.integer_width import as_int64
-from nanorocks_ros.simulation.engine.pair_times import is_rounding, minimum_image, speed_square
 from nanorocks_ros.simulation.engine.recent_contacts import is_repeated
 from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     CONSTANT,
@@ -55,7 +60,6 @@ from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     random_restitution,
     viscoelastic_restitution,
 )
-from nanorocks_ros.simulation.engine.unequal_drag import is_apart, with_least_separation
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules

@@ -32,13 +32,14 @@ from nanorocks_ros.simulation.engine.collision.moving_walls import (
     time_to_moving_wall,
     tray_displacement,
 )
-from nanorocks_ros.simulation.engine.gas_drag import (
+from nanorocks_ros.simulation.engine.flight.gas_drag import (
     drag_rate,
     flight_time,
     is_dragged,
     position_at,
     velocity_at,
 )
+from nanorocks_ros.simulation.engine.flight.pair_times import speed_square
 from nanorocks_ros.simulation.engine.gas_state import (
     ELASTIC_WALL,
     EPOCH,
@@ -61,7 +62,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     record_collision,
 )
 from nanorocks_ros.simulation.engine.integer_width import as_int64
-from nanorocks_ros.simulation.engine.pair_times import speed_square
 from nanorocks_ros.simulation.engine.recent_contacts import is_repeated
 
 if TYPE_CHECKING:

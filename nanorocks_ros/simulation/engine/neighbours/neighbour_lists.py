@@ -15,6 +15,7 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined, kernel
 from nanorocks_ros.simulation.engine.collision.aggregates import advance
+from nanorocks_ros.simulation.engine.flight.pair_times import speed_square
 from nanorocks_ros.simulation.engine.gas_state import (
     AHEAD,
     CELLS,
@@ -32,7 +33,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     X,
 )
 from nanorocks_ros.simulation.engine.integer_width import as_index, as_int64
-from nanorocks_ros.simulation.engine.pair_times import speed_square
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules

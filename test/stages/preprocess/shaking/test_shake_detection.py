@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from moving_beads import encoded, pictures, places
 
-from nanorocks_ros.stages.preprocess.difference_noise import noise_power
-from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
-from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter, PlateMeter
+from nanorocks_ros.stages.preprocess.shaking.difference_noise import noise_power
+from nanorocks_ros.stages.preprocess.shaking.onset_confirmation import Onsets
+from nanorocks_ros.stages.preprocess.shaking.shake_detection import MotionMeter, PlateMeter
 
 NS = 1_000_000_000
 STEP = NS // 30

@@ -5,7 +5,7 @@ contact has no closed form. It is approached by steps that cannot pass it: the g
 faster than a parabola with the present gap and closing speed that bends as much as the drag of
 both beads can bend it.
 
-Tested by ``test/simulation/engine/test_unequal_drag.py``.
+Tested by ``test/simulation/engine/flight/test_unequal_drag.py``.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.numerics.exponentials import decayed
-from nanorocks_ros.simulation.engine.gas_drag import drag_rate
+from nanorocks_ros.simulation.engine.flight.gas_drag import drag_rate
+from nanorocks_ros.simulation.engine.flight.pair_times import is_rounding, minimum_image
 from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS
-from nanorocks_ros.simulation.engine.pair_times import is_rounding, minimum_image
 
 if TYPE_CHECKING:
+    from nanorocks_ros.simulation.engine.flight.pair_times import Flights, Vector
     from nanorocks_ros.simulation.engine.gas_state import State
-    from nanorocks_ros.simulation.engine.pair_times import Flights, Vector
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # A gap of this fraction of the reach is a contact.

@@ -1,6 +1,6 @@
 """Noise of gray images, from the differences of successive ones.
 
-Tested by ``test/stages/preprocess/test_shake_detection.py``.
+Tested by ``test/stages/preprocess/shaking/test_shake_detection.py``.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import NS
-from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
-from nanorocks_ros.stages.preprocess.shake_detection import MotionMeter
+from nanorocks_ros.stages.preprocess.shaking.onset_confirmation import Onsets
+from nanorocks_ros.stages.preprocess.shaking.shake_detection import MotionMeter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

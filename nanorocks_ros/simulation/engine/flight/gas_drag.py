@@ -4,7 +4,7 @@ A bead of velocity v moves by v (1 - exp(-rate t)) / rate in the time t: as far 
 gas in its *flown time* (1 - exp(-rate t)) / rate, which ends at 1 / rate. Without drag both times
 are the same number, and the compiler leaves the rest of this module out.
 
-Tested by ``test/simulation/engine/test_gas_drag.py``.
+Tested by ``test/simulation/engine/flight/test_gas_drag.py``.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def flown_time(state: State, i: int, since: float) -> float:
 
 
 @inlined
-def flight_time(state: State, i: int, flown: float) -> float:
+def flight_time(state: State, i: int, undragged: float) -> float:
     """Time from now until a bead has flown as far as in a time without drag, [s].
 
     Infinite when the bead comes to rest before.
@@ -59,8 +59,8 @@ def flight_time(state: State, i: int, flown: float) -> float:
     if is_dragged(state):
         rate = drag_rate(state, i)
         if rate > 0.0:
-            return decay_time(rate * flown) / rate
-    return flown
+            return decay_time(rate * undragged) / rate
+    return undragged
 
 
 @inlined
@@ -91,11 +91,11 @@ def spin_left(state: State, i: int, since: float) -> float:
 def position_at(state: State, i: int, now: float) -> tuple[float, float, float]:
     """Position of a bead at a time, [m]."""
     rows = state.rows
-    flown = flown_time(state, i, now - rows[i, TIME])
+    since = flown_time(state, i, now - rows[i, TIME])
     return (
-        rows[i, X] + rows[i, VX] * flown,
-        rows[i, Y] + rows[i, VY] * flown,
-        rows[i, Z] + rows[i, VZ] * flown,
+        rows[i, X] + rows[i, VX] * since,
+        rows[i, Y] + rows[i, VY] * since,
+        rows[i, Z] + rows[i, VZ] * since,
     )
 
 

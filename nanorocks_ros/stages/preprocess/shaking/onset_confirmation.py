@@ -1,6 +1,6 @@
 """Confirmation of an onset of motion by the frames that follow it.
 
-Tested by ``test/stages/preprocess/test_shake_detection.py``.
+Tested by ``test/stages/preprocess/shaking/test_shake_detection.py``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.numerics.quantiles import median
 from nanorocks_ros.records import NS
-from nanorocks_ros.stages.preprocess.difference_noise import MEMORY_FRAMES
+from nanorocks_ros.stages.preprocess.shaking.difference_noise import MEMORY_FRAMES
 
 if TYPE_CHECKING:
     import numpy as np

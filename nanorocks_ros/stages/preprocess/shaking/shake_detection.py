@@ -17,14 +17,14 @@ import numpy as np
 
 from nanorocks_ros.numerics.quantiles import Quantile, median
 from nanorocks_ros.records import NS
-from nanorocks_ros.stages.preprocess.difference_noise import (
+from nanorocks_ros.stages.preprocess.shaking.difference_noise import (
     MEMORY_FRAMES,
     NOISE_QUANTILE,
     clipped_power,
     difference_counts,
     total_power,
 )
-from nanorocks_ros.stages.preprocess.onset_confirmation import (
+from nanorocks_ros.stages.preprocess.shaking.onset_confirmation import (
     Candidate,
     Candidates,
     FrameClock,

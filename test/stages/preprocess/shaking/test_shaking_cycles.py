@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from moving_beads import images, pictures, places
 
-from nanorocks_ros.stages.preprocess.onset_confirmation import Onsets
-from nanorocks_ros.stages.preprocess.shaking_cycles import (
+from nanorocks_ros.stages.preprocess.shaking.onset_confirmation import Onsets
+from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import (
     CycleFollower,
     HeldImages,
     ShakeCounter,
