@@ -69,15 +69,14 @@ def _radii(film: FilmTruth) -> dict[int, tuple[NDArray[np.float64], ...]]:
         arrays = {name: archive[name] for name in ('P', 'V', 'box')}
         scene = json.loads(str(archive['settings']))['scene'] if 'settings' in archive else {}
         shifts = archive['C'] if 'C' in archive else np.zeros((len(arrays['P']), 2))
-    height, exposure = scene.get('camera_height', 0.0), scene.get('exposure', _EXPOSURE)
+    exposure = scene.get('exposure', _EXPOSURE)
     middle = 0.5 * arrays['box'][:2] * film.scale
     blur = np.hypot(*np.moveaxis(arrays['V'][..., :2], -1, 0))
     blur *= film.scale * exposure / film.frame_rate
     detector = BeadDetector(TrackingSettings(), load_trays()[film.tray], film.scale)
     rows: dict[int, list[tuple[float, float, float]]] = {}
     for number, image in _images(film, arrays['box']):
-        above = arrays['P'][number, :, 2]
-        magnified = height / (height - above) if height > 0.0 else np.ones(above.size)
+        magnified = film.magnification[number]
         places = arrays['P'][number, :, :2] * film.scale - middle
         tree = cKDTree(middle + places * magnified[:, np.newaxis] + shifts[number])
         true = film.radii * film.scale

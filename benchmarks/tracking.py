@@ -20,6 +20,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import BeadsTruth, Tracks
 from nanorocks_ros.settings import PipelineSettings, TrackingSettings, with_values
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector, Detections
+from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviations
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.mean_speed import mean_speed
 from nanorocks_ros.stages.tracking.tracker import Tracker
@@ -203,7 +204,7 @@ def _link_ours(detections: list[Detections], number: int, index: int) -> list[ND
         settings.max_speed * SCALE,
         settings.memory,
         settings.window,
-        0.0,
+        FlightDeviations(0.5 * tray.species[index].diameter * SCALE),
     )
     first, numbers = 0, []
     for k, frame_detections in enumerate(detections):

@@ -43,33 +43,40 @@ def measurable(tray: Tray, species: Species) -> bool:
 
 
 def radius_scale(
-    species: Species, radii: NDArray[np.float64], frames: int
+    species: Species, radii: NDArray[np.float64], errors: NDArray[np.float64], frames: int
 ) -> tuple[float, float] | None:
     """Scale over that of the settings, and its error; None when the radii do not tell.
 
     Parameters
     ----------
     species : Species
-    radii : ndarray (n,), [m]
-        At the scale of the settings, from all frames.
+    radii, errors : ndarray (n,), [m]
+        At the scale of the settings, from all frames. Stated errors hold what blur and highlights
+        may displace the outlines of all beads by, which is much for small ones.
     frames : int
     """
     beads = radii.size / max(frames, 1)
     if beads < max(_LEAST_BEADS, _LEAST_SHARE * species.count):
         return None
+    shared = math.hypot(_RADIUS_BIAS, float(np.median(errors / radii)))
     if not alike(species):
-        return _range_scale(species, radii)
+        return _range_scale(species, radii, shared)
     low, middle, high = np.quantile(radii, [0.25, 0.5, 0.75]) / (0.5 * species.diameter)
     spread = 0.5 * (high - low) / middle
     if spread > _LARGEST_SPREAD:
         return None
     # The same beads in every frame.
-    error = math.hypot(_RADIUS_BIAS, 1.9 * spread / math.sqrt(beads))
+    error = math.hypot(shared, 1.9 * spread / math.sqrt(beads))
     return float(middle), error
 
 
-def _range_scale(species: Species, radii: NDArray[np.float64]) -> tuple[float, float] | None:
-    """Nothing is known of the distribution but its ends: the scale lies between two limits."""
+def _range_scale(
+    species: Species, radii: NDArray[np.float64], shared: float
+) -> tuple[float, float] | None:
+    """Nothing is known of the distribution but its ends: the scale lies between two limits.
+
+    `shared` is the relative error of all radii together.
+    """
     small, large = np.quantile(radii, [_TAIL, 1.0 - _TAIL])
     lowest = 2.0 * large / species.diameter_high
     highest = 2.0 * small / species.diameter_low
@@ -77,4 +84,4 @@ def _range_scale(species: Species, radii: NDArray[np.float64]) -> tuple[float, f
         return None
     middle, half = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
     # The limits are two standard errors away.
-    return float(middle), float(math.hypot(_RADIUS_BIAS, 0.5 * half / middle))
+    return float(middle), float(math.hypot(shared, 0.5 * half / middle))

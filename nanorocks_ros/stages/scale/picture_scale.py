@@ -10,6 +10,7 @@ import numpy as np
 from nanorocks_ros.stages.scale.bead_radii import alike, measurable, radius_scale
 from nanorocks_ros.stages.scale.rulers import TOLERANCE
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
+from nanorocks_ros.stages.tracking.linking.track_snapshot import BLUR_BIAS_PX2
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -135,7 +136,9 @@ def _at_scale(
         whole = detected.visible_outline > 0.5
         if whole.sum() > 1.2 * species.count:
             return None
-        ratio = radius_scale(species, detected.radii[whole] / scale, 1)
+        radii = detected.radii[whole]
+        errors = BLUR_BIAS_PX2 / radii
+        ratio = radius_scale(species, radii / scale, errors / scale, 1)
         if ratio is not None:
             ratios.append(ratio)
     return min(ratios, key=lambda ratio: ratio[1]) if ratios else None

@@ -71,6 +71,7 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
         self._next = _SOON
         self._flagged_at = math.inf
         self._misplaced = False
+        # Radii and their errors, (2, n), in some pictures.
         self._radii: list[list[np.ndarray]] = [[] for _ in self._tray.species]
         self._contacts: list[tuple[int, float, float]] = []
         self._turns = TurningPoints(0.5 * self._tray.diameter)
@@ -112,7 +113,8 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
             return
         self._pictures += 1
         for k, radii in enumerate(self._radii):
-            radii.append(tracks.radii[tracks.seen & (tracks.species == k)])
+            own = tracks.seen & (tracks.species == k)
+            radii.append(np.stack([tracks.radii[own], tracks.radius_errors[own]]))
 
     def _compare(self) -> None:
         rulers = [*self._told, *self._by_radii(), *self._by_contacts(), *self._by_walls()]
@@ -139,7 +141,8 @@ class ScaleCheck(RestartingStage[Tracks | PairCollision, Notice]):
         for species, radii in zip(self._tray.species, self._radii, strict=True):
             if not measurable(self._tray, species):
                 continue
-            scale = radius_scale(species, np.concatenate(radii), self._pictures)
+            values, errors = np.concatenate(radii, axis=1)
+            scale = radius_scale(species, values, errors, self._pictures)
             if scale is not None:
                 name = f'radii of {species.material} beads'
                 rulers.append(Ruler(name=name, source='beads', ratio=scale[0], error=scale[1]))

@@ -31,15 +31,19 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Path of a bead in half of the window, at least: jitter is far less.
-_SHORTEST_PATH_PX = 1.5
+# Path of a bead in half of the window, at least. The jitter between frames is far less, but a bead
+# that others hide in part is placed 0.4 px (rms) off for as long as they hide it: over 1.5 px,
+# speeds below 1 mm/s were 3 to 5 % too high where beads hide each other.
+_SHORTEST_PATH_PX = 3.0
 # The same where there are grains: as they turn and hide one another their outlines seem to move,
-# by a share of their radius and by more than a pixel. Speeds from paths shorter than the share
-# below are flagged.
-_SHORTEST_GRAIN_PATH_PX, _SHORTEST_GRAIN_PATH_RADII = 2.2, 0.47
-_LONG_ENOUGH = 0.8
+# by a share of their radius and by more than a pixel.
+_SHORTEST_GRAIN_PATH_PX, _SHORTEST_GRAIN_PATH_RADII = 4.0, 0.47
+# Speeds of trays with grains from shorter paths are flagged.
+_FLAGGED_GRAIN_PATH_PX, _FLAGGED_GRAIN_PATH_RADII = 1.8, 0.38
 # Longest window; slower beads rest.
 _LONGEST_WINDOW_NS = 3 * NS
+# Standard errors from 0 below which beads are at rest: they need not move to be sure of that.
+_REST_ERRORS = 3.0
 
 
 class TrackSpeed:
@@ -59,8 +63,9 @@ class TrackSpeed:
 
     def __init__(self, settings: PipelineSettings, tray: Tray, *, crowded: bool) -> None:
         self._interval_ns = round(settings.speed.interval * NS)
-        self._grains = any(species.properties.shape == 'grain' for species in tray.species)
-        self._shortest_path = _shortest_path(tray, settings.preprocess.pixels_per_metre)
+        self._shortest_path, self._flagged_path = _shortest_paths(
+            tray, settings.preprocess.pixels_per_metre
+        )
         self._tray = tray
         self._crowded = crowded
         self.reset()
@@ -139,8 +144,9 @@ class TrackSpeed:
         if mean.share < RELIABLE_SHARE:
             flags |= Quality.FEW_BEADS
         path = 0.5 * mean.window * mean.mean_projected_speed
-        too_short = self._grains and path < _LONG_ENOUGH * self._shortest_path
-        if too_short or not self.reliability.told_apart:
+        at_rest = mean.mean_projected_speed < _REST_ERRORS * mean.mean_projected_speed_error
+        is_certain = (mean.beyond_errors or at_rest) and self.reliability.told_apart
+        if path < self._flagged_path or not is_certain:
             flags |= Quality.UNCERTAIN
         return (
             SpeedEstimate(
@@ -159,10 +165,13 @@ class TrackSpeed:
         )
 
 
-def _shortest_path(tray: Tray, pixels_per_metre: float) -> float:
-    """Path of a bead in half of the window, at least, [m]."""
+def _shortest_paths(tray: Tray, pixels_per_metre: float) -> tuple[float, float]:
+    """Paths of a bead in half of the window: that aimed at, and the shortest not flagged, [m]."""
     grains = [species for species in tray.species if species.properties.shape == 'grain']
     if not grains:
-        return _SHORTEST_PATH_PX / pixels_per_metre
+        return _SHORTEST_PATH_PX / pixels_per_metre, 0.0
     radius = 0.5 * max(species.diameter for species in grains)
-    return max(_SHORTEST_GRAIN_PATH_PX / pixels_per_metre, _SHORTEST_GRAIN_PATH_RADII * radius)
+    return (
+        max(_SHORTEST_GRAIN_PATH_PX / pixels_per_metre, _SHORTEST_GRAIN_PATH_RADII * radius),
+        max(_FLAGGED_GRAIN_PATH_PX / pixels_per_metre, _FLAGGED_GRAIN_PATH_RADII * radius),
+    )

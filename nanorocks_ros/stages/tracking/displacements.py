@@ -1,4 +1,4 @@
-"""Displacements of beads between three frames, from their tracks."""
+"""Displacements of beads between two or three frames, from their tracks."""
 
 from __future__ import annotations
 
@@ -245,6 +245,35 @@ def _write_distances(
         variances[k] = total / 3.0
         variance += min(variances[k], noise)
     return square, variance
+
+
+@compiled
+def pair_displacements(
+    series: TrackSeries, later: int, earlier: int, species: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Distances that each bead moved between two frames in which it is visible.
+
+    Parameters
+    ----------
+    series : TrackSeries
+    later, earlier : int
+        Frames.
+    species : int
+        Index of the species, or `ALL_SPECIES`.
+
+    Returns
+    -------
+    distances : ndarray (n,), [m]
+    species : ndarray of int64, (n,)
+    """
+    first, second = _usable_beads(series, later, species), _usable_beads(series, earlier, species)
+    rows = np.empty((3, min(first.size, second.size)), dtype=np.int64)
+    n = _common_beads(series.ids, first, second, second, rows)
+    distances, kinds = np.empty(n), np.empty(n, dtype=np.int64)
+    for k in range(n):
+        distances[k] = _distance(series, rows[0, k], rows[1, k])
+        kinds[k] = series.species[rows[0, k]]
+    return distances, kinds
 
 
 @compiled

@@ -4,12 +4,17 @@ Noise makes the distance between two positions of a bead longer than its path, c
 shorter. The distance is taken over a lag at which displacements are well above the noise. The
 variance of the noise is subtracted. Displacements over twice the lag give the shortening by
 collisions.
+
+Beads that are not seen are not a random sample. Fast ones are lost more often: a bead counts that
+is seen in two frames, not only one seen in all three. In a mixture one species hides the other:
+each species counts by its number of beads in the tray.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +25,7 @@ from nanorocks_ros.stages.tracking.displacements import (
     TrackSeries,
     displacements_beyond_noise,
     join_tracks,
+    pair_displacements,
     position_noise,
 )
 
@@ -37,15 +43,19 @@ sometimes wrong by more than 20 %."""
 _NS = 1e9
 # Smallest displacement over the error of a coordinate: the noise then adds 2 % to the mean square.
 _MIN_NOISE_RATIO = 14.0
-# The same for errors that positions share for some time, such as those from patches of chalk; and
-# the part of it below which a speed is unreliable.
-_MIN_ERROR_RATIO = 4.0
-_RELIABLE_FACTOR = 0.8
+# The same for all errors, which positions share for some time, such as those from patches of
+# chalk. Errors s that the ends of a path do not share make a speed from distances d in half and
+# whole windows 7/4 s^2 / d^2 too high: 2.7 %; longer paths lose as much by collisions. And the
+# ratio below which a speed is unreliable.
+_MIN_ERROR_RATIO = 8.0
+_RELIABLE_RATIO = 3.2
 # Relative error of the mean over the share of lost beads: fast beads are lost more often. At
 # 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
 _LOSS_BIAS = 0.4
 # Smallest number of beads of a mean.
 _MIN_BEADS = 3
+# Smallest share of a species that is taken for a sample of all of it.
+_MIN_SAMPLE_SHARE = 0.3
 NOISE_FRAMES = 10
 """Number of frames from which the noise is measured."""
 
@@ -69,6 +79,8 @@ class MeanSpeed:
     reliable : bool
         Whether enough beads have tracks (where many are lost, others are linked wrongly), and
         displacements exceed the position errors.
+    beyond_errors : bool
+        Whether displacements exceed the position errors.
     """
 
     stamp_ns: int
@@ -78,6 +90,7 @@ class MeanSpeed:
     beads: int
     share: float
     reliable: bool
+    beyond_errors: bool
 
 
 def mean_speed(
@@ -143,14 +156,18 @@ def mean_speeds_of_series(
             recent,
             least_distance,
             ALL_SPECIES if index is None else index,
-            int(expected.sum() if index is None else expected[index]),
+            expected,
         )
         for index in species
     ]
 
 
 def _mean_speed(
-    series: TrackSeries, recent: TrackSeries, least_distance: float, species: int, expected: int
+    series: TrackSeries,
+    recent: TrackSeries,
+    least_distance: float,
+    species: int,
+    expected: NDArray[np.int32],
 ) -> MeanSpeed | None:
     minimum = MinDisplacement(
         least_distance * least_distance, _MIN_NOISE_RATIO**2, _MIN_ERROR_RATIO**2, _MIN_BEADS
@@ -160,11 +177,16 @@ def _mean_speed(
     )
     if not lag:
         return None
-    distances = _Distances(*distance_rows, *means)
-    last = series.stamps.size - 1
-    first, middle, end = (int(series.stamps[last - k * lag]) for k in (2, 1, 0))
+    frames = tuple(series.stamps.size - 1 - k * lag for k in range(3))
+    halves = tuple(
+        _Half(*pair_displacements(series, later, earlier, species), expected)
+        for later, earlier in pairwise(frames)
+    )
+    distances = _Distances(halves, *distance_rows, *means)
+    end, middle, first = (int(series.stamps[frame]) for frame in frames)
     window = (end - first) / _NS
-    share = distances.whole_window.size / max(expected, 1)
+    beads = int(expected.sum() if species == ALL_SPECIES else expected[species])
+    share = distances.whole_window.size / max(beads, 1)
     value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
     error = math.hypot(error, _LOSS_BIAS * max(1.0 - share, 0.0) * value)
     return MeanSpeed(
@@ -175,7 +197,27 @@ def _mean_speed(
         beads=distances.whole_window.size,
         share=share,
         reliable=share >= RELIABLE_SHARE and distances.exceed_errors(),
+        beyond_errors=distances.exceed_errors(),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Half:
+    """Distances and species of the beads seen at both ends of half of the window.
+
+    `expected` is the number of beads of each species in the tray.
+    """
+
+    distances: NDArray[np.float64]
+    species: NDArray[np.int64]
+    expected: NDArray[np.int32]
+
+    def mean_distance(self, variance: float) -> float:
+        """Mean over all beads in the tray: those of a species stand for the unseen ones of it."""
+        seen = np.bincount(self.species, minlength=self.expected.size)
+        fewest = np.maximum(_MIN_SAMPLE_SHARE * self.expected, 1.0)
+        weights = self.expected / np.maximum(seen, fewest)
+        return _mean_distance(self.distances, variance, weights[self.species])
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,8 +225,11 @@ class _Distances:
     """Distances of each bead in the later half of the window, in the earlier half and in both.
 
     `square` is the mean square distance in half of the window; see `displacements_between`.
+    `halves` are the beads seen at both ends of the later and the earlier half, wherever they are
+    at the other end of the window.
     """
 
+    halves: tuple[_Half, ...]
     later: NDArray[np.float64]
     earlier: NDArray[np.float64]
     whole_window: NDArray[np.float64]
@@ -194,16 +239,20 @@ class _Distances:
 
     def exceed_errors(self) -> bool:
         """Whether displacements exceed the position errors, such as those from rotating chalk."""
-        return self.square >= (_RELIABLE_FACTOR * _MIN_ERROR_RATIO) ** 2 * self.position_variance
+        return self.square >= _RELIABLE_RATIO**2 * self.position_variance
 
     def speed(self, later_time: float, earlier_time: float) -> tuple[float, float]:
-        half = 0.5 * (
+        of_three = 0.5 * (
             _mean_distance(self.later, self.variance) / later_time
             + _mean_distance(self.earlier, self.variance) / earlier_time
         )
         full = _mean_distance(self.whole_window, self.variance) / (later_time + earlier_time)
+        half = 0.5 * sum(
+            part.mean_distance(self.variance) / time
+            for part, time in zip(self.halves, (later_time, earlier_time), strict=True)
+        )
         # Collisions shorten the distance in proportion to the time, to first order.
-        shortened = max(half - full, 0.0)
+        shortened = half * max(1.0 - full / of_three, 0.0) if of_three > 0.0 else 0.0
         noise_error = self._jitter_error(0.5 * (later_time + earlier_time) * half)
         per_time = 2.0 / (later_time + earlier_time)
         bead_scatter = np.hypot(self.later - self.earlier, 1e-3 * self.later) * per_time
@@ -211,9 +260,7 @@ class _Distances:
             0.5 * math.sqrt(_mean(bead_scatter * bead_scatter)) / math.sqrt(self.whole_window.size)
         )
         shared_error = self._shared_share() * half
-        error = math.hypot(
-            noise_error * per_time, 0.5 * shortened, 0.8 * scatter, 0.5 * shared_error
-        )
+        error = math.hypot(noise_error * per_time, 0.5 * shortened, scatter, shared_error)
         return max(half + shortened, 0.0), error
 
     def _shared_share(self) -> float:
@@ -228,16 +275,21 @@ class _Distances:
         return math.hypot(math.sqrt(2.0 * self.variance / self.whole_window.size), rest_error)
 
 
-def _mean_distance(distances: NDArray[np.float64], variance: float) -> float:
+def _mean_distance(
+    distances: NDArray[np.float64],
+    variance: float,
+    weights: NDArray[np.float64] | float = 1.0,
+) -> float:
     """Mean distance corrected for Gaussian noise of both positions.
 
     Exact for a Maxwellian gas.
     """
-    square = _mean(distances * distances)
+    total = _mean(np.ones(distances.size) * weights)
+    square = _mean(weights * distances * distances) / total
     corrected = square - 4.0 * variance
     if corrected <= 0.0:
         return 0.0
-    return _mean(distances) * math.sqrt(corrected / square)
+    return _mean(weights * distances) / total * math.sqrt(corrected / square)
 
 
 def _mean(values: NDArray[np.float64]) -> float:

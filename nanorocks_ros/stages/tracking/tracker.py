@@ -12,6 +12,7 @@ from nanorocks_ros.records import Quality, Tracks, TrayImage
 from nanorocks_ros.stages.stage import RestartingStage
 from nanorocks_ros.stages.tracking.camera_motion import CameraMotion
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
+from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviations
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.linking.track_snapshot import (
     allocate_snapshot,
@@ -140,7 +141,11 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             self._settings.max_speed * self._scale,
             self._settings.memory,
             self._settings.window,
-            self._systematic_error(species.properties),
+            FlightDeviations(
+                0.5 * species.diameter * self._scale,
+                assumed=self._systematic_error(species.properties),
+                hidden=self._tray.chalk,
+            ),
         )
 
     def _systematic_error(self, material: Material) -> float:

@@ -15,6 +15,7 @@ from nanorocks_ros.records import Quality, Tracks
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.scale.bead_radii import measurable, radius_scale
 from nanorocks_ros.stages.scale.contact_distances import contact_scale
+from nanorocks_ros.stages.scale.rulers import Ruler, contradict
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
 
 TRAYS = load_trays()
@@ -233,6 +234,19 @@ def test_radii_of_a_range_are_limits():
     species = TRAYS[5].species[0]
     rng = np.random.default_rng(0)
     radii = 0.5 * rng.uniform(species.diameter_low, species.diameter_high, 400)
-    scale, error = radius_scale(species, radii, 10)
+    scale, error = radius_scale(species, radii, 0.01 * radii, 10)
     assert abs(scale - 1.0) < 2.0 * error
-    assert radius_scale(species, radii[:100], 10) is None
+    assert radius_scale(species, radii[:100], 0.01 * radii[:100], 10) is None
+
+
+def test_radii_with_large_stated_errors_contradict_nothing():
+    """Highlights made glass of 4 px 12 % large, and the scale of the film was refused."""
+    species = TRAYS[1].species[0]
+    radii = np.full(10 * species.count, 0.56 * species.diameter)
+    scale, error = radius_scale(species, radii, 0.06 * radii, 10)
+    told = Ruler(name='told', source='told', ratio=1.0, error=1e-6)
+    measured = Ruler(name='radii', source='beads', ratio=scale, error=error)
+    assert scale == pytest.approx(1.12)
+    assert not contradict(told, measured)
+    scale, error = radius_scale(species, radii, 0.005 * radii, 10)
+    assert contradict(told, Ruler(name='radii', source='beads', ratio=scale, error=error))

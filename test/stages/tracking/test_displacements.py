@@ -12,6 +12,7 @@ from nanorocks_ros.stages.tracking.displacements import (
     ALL_SPECIES,
     displacements_between,
     join_tracks,
+    pair_displacements,
     position_noise,
 )
 
@@ -77,6 +78,19 @@ def test_displacements_are_of_the_beads_visible_in_all_three_frames(species):
         assert square == pytest.approx(np.mean(expected[:2] ** 2))
         assert variance == pytest.approx(np.mean(np.minimum(variances, 3e-12)))
         assert position_variance == pytest.approx(np.median(variances))
+
+
+@pytest.mark.parametrize('species', [ALL_SPECIES, 0, 1])
+def test_pair_displacements_are_of_the_beads_visible_in_both_frames(species):
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        tracks = [_frame(rng, number) for number in range(3)]
+        earlier, later = (_usable(tracks[k], species) for k in (0, 2))
+        common = sorted(earlier.keys() & later.keys())
+        distances, kinds = pair_displacements(join_tracks(tracks), 2, 0, species)
+        paths = [np.linalg.norm(later[bead][0] - earlier[bead][0]) for bead in common]
+        assert distances == pytest.approx(paths)
+        assert kinds.tolist() == [bead % 2 for bead in common]
 
 
 def test_the_noise_is_unknown_without_three_frames_at_equal_intervals():

@@ -88,6 +88,45 @@ def test_a_speed_of_half_of_the_beads_is_not_reliable():
     assert (estimate.beads, estimate.share, estimate.reliable) == (10, 0.5, False)
 
 
+def test_a_species_that_is_hidden_counts_by_its_number_in_the_tray():
+    velocities = np.zeros((40, 2))
+    velocities[:10, 0], velocities[10:, 1] = 2e-3, 6e-3
+    species = np.repeat([0, 1], [10, 30]).astype(np.int32)
+    seen = (np.arange(40) < 10) | (np.arange(40) % 2 == 0)
+    tracks = [
+        replace(record, seen=seen)
+        for record in _tracks(velocities, 0.05 * PIXEL, 30, species=species)
+    ]
+    estimate = mean_speed(tracks, least_distance=1.5 * PIXEL)
+    assert estimate.mean_projected_speed == pytest.approx(5e-3, rel=0.01)
+
+
+def test_a_species_that_is_hardly_seen_is_no_sample_of_its_beads():
+    velocities = np.zeros((40, 2))
+    velocities[:10, 0], velocities[10:, 1] = 2e-3, 6e-3
+    species = np.repeat([0, 1], [10, 30]).astype(np.int32)
+    tracks = [
+        replace(record, seen=np.arange(40) < 11)
+        for record in _tracks(velocities, 0.05 * PIXEL, 30, species=species)
+    ]
+    estimate = mean_speed(tracks, least_distance=1.5 * PIXEL)
+    # The only one seen stands for 1 / 0.3 beads.
+    expected = (10 * 2e-3 + 6e-3 / 0.3) / (10 + 1 / 0.3)
+    assert estimate.mean_projected_speed == pytest.approx(expected, rel=0.01)
+
+
+def test_beads_count_that_are_seen_in_two_frames_of_three():
+    velocities = np.zeros((20, 2))
+    velocities[:10, 0], velocities[10:, 0] = 3e-3, 9e-3
+    tracks = list(_tracks(velocities, 0.01 * PIXEL, 12))
+    # The fast ones were lost and come back in the last two frames.
+    slow = np.arange(20) < 10
+    tracks = [*(replace(record, seen=slow) for record in tracks[:-2]), *tracks[-2:]]
+    estimate = mean_speed(tracks, least_distance=PIXEL)
+    assert estimate.window == pytest.approx(2.0 / RATE)
+    assert estimate.mean_projected_speed == pytest.approx(0.5 * (6e-3 + 3e-3), rel=0.01)
+
+
 def test_two_beads_or_two_frames_have_no_mean_speed():
     tracks = list(_tracks(np.full((5, 2), 1e-3), 1e-6, 20))
     assert mean_speed(tracks[:2], least_distance=PIXEL) is None

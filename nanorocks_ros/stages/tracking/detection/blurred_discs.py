@@ -18,13 +18,14 @@ from scipy.special import i0e
 from nanorocks_ros.stages.tracking.detection.bead_edges import (
     CURVATURES,
     MAX_CURVATURE,
+    MAX_REACH_PX,
     edges_between,
 )
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-REACHES = 2, 3
+REACHES = MAX_REACH_PX - 1, MAX_REACH_PX
 """Distances within which edges are searched, [px]."""
 # Gauss-Legendre nodes of the integral over a disc, within so many widths of the blur.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.numerics.compiled import compiled, kernel
 from nanorocks_ros.stages.tracking.detection.bead_edges import (
     EDGE_CLEARANCE_PX,
+    MAX_REACH_PX,
     RAYS,
+    SAMPLE_CLEARANCE_PX,
     EdgeMaps,
     Rays,
     allocate_rays,
@@ -44,12 +46,13 @@ def find_neighbours(discs: NDArray[np.float64], row: int, count: int, rays: Rays
     x, y, radius = discs[row, 0], discs[row, 1], discs[row, 2]
     n = 0
     for k in range(count):
-        reach = discs[k, 2] + radius + EDGE_CLEARANCE_PX + _START_ERROR_PX
+        clearance = MAX_REACH_PX + SAMPLE_CLEARANCE_PX + _START_ERROR_PX
+        reach = discs[k, 2] + radius + clearance
         dx, dy = discs[k, 0] - x, discs[k, 1] - y
         if dx * dx + dy * dy < reach * reach and k != row and n < rays.neighbours.shape[0]:
-            near = discs[k, 2] + 0.5 * EDGE_CLEARANCE_PX
+            of_edge, of_sample = discs[k, 2] + EDGE_CLEARANCE_PX, discs[k, 2] + SAMPLE_CLEARANCE_PX
             rays.neighbours[n, 0], rays.neighbours[n, 1] = discs[k, 0], discs[k, 1]
-            rays.neighbours[n, 2] = near * near
+            rays.neighbours[n, 2], rays.neighbours[n, 3] = of_edge * of_edge, of_sample * of_sample
             n += 1
     return n
 

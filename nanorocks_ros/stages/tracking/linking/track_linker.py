@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
+    from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviations
 
 # Rate of unseen collisions of a bead, [1/s].
 _COLLISION_RATE = 5.0
@@ -47,8 +48,8 @@ class Linker:
         Columns and rows of the tray.
     max_speed : float, [px/s]
     memory, window : float, [s]
-    systematic : float, [px]
-        Error that all positions of a bead share.
+    deviations : FlightDeviations
+        Of this species, in pixels: it learns the errors of the positions.
     """
 
     def __init__(
@@ -58,9 +59,9 @@ class Linker:
         max_speed: float,
         memory: float,
         window: float,
-        systematic: float,
+        deviations: FlightDeviations,
     ) -> None:
-        self.systematic = systematic
+        self._deviations = deviations
         self._size = np.array(size)
         self._max_speed = max_speed
         self._settings = LinkSettings(expected, memory, window)
@@ -131,7 +132,15 @@ class Linker:
         )
         self._started = True
         self._last_prediction = None
+        self._measure_errors(time)
         return int(n_new)
+
+    def _measure_errors(self, time: float) -> None:
+        """Compare stated errors of positions with how far these lie off straight flights."""
+        count, tracks = self._n_tracks, self._tracks
+        seen = (tracks.last_seen[:count] == time) & (tracks.hits[:count] >= CONFIRM_FRAMES)
+        positions, errors = tracks.positions[:count, 0], tracks.errors[:count, 0]
+        self._deviations.push(time, tracks.ids[:count][seen], positions[seen], errors[seen])
 
     def _grow(self, n_tracks: int, n_new: int) -> None:
         """Enlarge the store if it cannot hold `n_new` more tracks."""
@@ -192,7 +201,7 @@ class Linker:
             self._n_tracks,
             time,
             self._walls(shift),
-            self.systematic,
+            self._deviations.scaling,
             collisions,
             species,
             snapshot,

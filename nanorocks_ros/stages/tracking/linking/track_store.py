@@ -27,6 +27,9 @@ CONFIRM_FRAMES = 3
 # Weight of a frame in the exponential mean of the speed.
 _SPEED_WEIGHT = 0.1
 
+ALIKE_RADII = 0.5
+"""Length over which light, shadow and outline displace a bead by the same amount, in radii."""
+
 
 class TrackStore(NamedTuple):
     """Arrays with one row for each track, and spare rows; lengths in pixels, times in seconds.
@@ -39,6 +42,10 @@ class TrackStore(NamedTuple):
     hits : ndarray of int64, (capacity,)
         Number of detections.
     radii, radius_weights : ndarray (capacity,), [px], [1/px^2]
+    radius_squares : ndarray (capacity,)
+        Sum of the squared residuals of the radii, over their stated variances.
+    independent_weights : ndarray (capacity,), [1/px^2]
+        Weight of the radii as far as their errors are not those of the frame before.
     visible_shares : ndarray (capacity,)
         Share of the disc that was visible last, halved in each frame since.
     times, errors : ndarrays (capacity, MAX_POINTS)
@@ -55,6 +62,8 @@ class TrackStore(NamedTuple):
     hits: NDArray[np.int64]
     radii: NDArray[np.float64]
     radius_weights: NDArray[np.float64]
+    radius_squares: NDArray[np.float64]
+    independent_weights: NDArray[np.float64]
     visible_shares: NDArray[np.float64]
     times: NDArray[np.float64]
     positions: NDArray[np.float64]
@@ -87,6 +96,8 @@ def allocate_tracks(capacity: int) -> TrackStore:
         hits=np.empty(capacity, dtype=np.int64),
         radii=np.empty(capacity),
         radius_weights=np.empty(capacity),
+        radius_squares=np.empty(capacity),
+        independent_weights=np.empty(capacity),
         visible_shares=np.empty(capacity),
         times=np.empty((capacity, MAX_POINTS)),
         positions=np.empty((capacity, MAX_POINTS, 2)),
@@ -136,13 +147,29 @@ def append_detections(
             detected.errors[j],
             settings.window,
         )
-        weight = 1.0 / (detected.radius_errors[j] * detected.radius_errors[j])
-        total = tracks.radius_weights[k] + weight
-        tracks.radii[k] += (detected.radii[j] - tracks.radii[k]) * weight / total
-        tracks.radius_weights[k] = total
+        _append_radius(tracks, k, detected.radii[j], detected.radius_errors[j])
         tracks.last_seen[k] = time
         tracks.visible_shares[k] = visible_shares[j]
         tracks.hits[k] += 1
+
+
+@inlined
+def _append_radius(tracks: TrackStore, k: int, radius: float, error: float) -> None:
+    """Average a measured radius with those before.
+
+    Light and outline are alike where the bead has hardly moved, and so is the error: only the
+    part of the way to independence counts for the error of the mean.
+    """
+    weight = 1.0 / (error * error)
+    total = tracks.radius_weights[k] + weight
+    residual = radius - tracks.radii[k]
+    tracks.radii[k] += residual * weight / total
+    tracks.radius_weights[k] = total
+    tracks.radius_squares[k] += weight * residual * (radius - tracks.radii[k])
+    dx = tracks.positions[k, 0, 0] - tracks.positions[k, 1, 0]
+    dy = tracks.positions[k, 0, 1] - tracks.positions[k, 1, 1]
+    independent = min(math.sqrt(dx * dx + dy * dy) / (ALIKE_RADII * tracks.radii[k]), 1.0)
+    tracks.independent_weights[k] += weight * independent
 
 
 @compiled
@@ -208,6 +235,8 @@ def _copy_track(tracks: TrackStore, source: int, target: int) -> None:
     tracks.hits[target] = tracks.hits[source]
     tracks.radii[target] = tracks.radii[source]
     tracks.radius_weights[target] = tracks.radius_weights[source]
+    tracks.radius_squares[target] = tracks.radius_squares[source]
+    tracks.independent_weights[target] = tracks.independent_weights[source]
     tracks.visible_shares[target] = tracks.visible_shares[source]
     tracks.flight_points[target] = tracks.flight_points[source]
     for k in range(9):
@@ -250,6 +279,8 @@ def add_tracks(
         tracks.radius_weights[n_tracks] = 1.0 / (
             detected.radius_errors[j] * detected.radius_errors[j]
         )
+        tracks.radius_squares[n_tracks] = 0.0
+        tracks.independent_weights[n_tracks] = tracks.radius_weights[n_tracks]
         tracks.visible_shares[n_tracks], tracks.flight_points[n_tracks] = visible_shares[j], 1
         tracks.times[n_tracks, 0], tracks.errors[n_tracks, 0] = time, detected.errors[j]
         line = tracks.lines[n_tracks]

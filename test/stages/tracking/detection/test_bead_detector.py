@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
+from shaded_discs import Optics, draw, film
 from tracking_films import SCALE, match_positions, tray_film
 
 from nanorocks_ros.experiment.trays import load_trays
@@ -47,6 +49,35 @@ def test_the_radius_of_each_bead_is_measured_in_a_species_of_many_sizes():
     assert np.median(np.abs(position_errors)) < 0.1
 
 
+def _blurred_beads(places, blur):
+    """Image of flat discs of tray 1 at places (n, 2) [px] through a lens with some blur [px]."""
+    acrylic = load_trays()[1].species[0]
+    rows, columns = (np.indices((188 * 8, 188 * 8)) + 0.5) / 8
+    image = np.full((188 * 8, 188 * 8, 3), 150.0)
+    for x, y in places:
+        covered = np.hypot(columns - x, rows - y) < 0.5 * acrylic.diameter * SCALE
+        image[covered] = np.array(acrylic.properties.color) * 0.8
+    image = cv2.GaussianBlur(image, (0, 0), 8.0 * blur)
+    return cv2.resize(image, (188, 188), interpolation=cv2.INTER_AREA).round().astype(np.uint8)
+
+
+@pytest.mark.parametrize('gap', [2.0, 3.0, 4.0])
+def test_a_bead_that_is_near_does_not_push_another_away(gap):
+    radius = 0.5 * load_trays()[1].species[0].diameter * SCALE
+    distance = 2.0 * radius + gap
+    rng = np.random.default_rng(4)
+    errors = []
+    for angle in rng.uniform(0.0, np.pi, 8):
+        step = 0.5 * distance * np.array([np.cos(angle), np.sin(angle)])
+        middle = 94.0 + rng.uniform(-0.5, 0.5, 2)
+        detector = BeadDetector(TrackingSettings(), load_trays()[1], SCALE)
+        image = _blurred_beads([middle - step, middle + step], 1.0)
+        positions = detector.detect(image)[0].positions
+        assert len(positions) == 2
+        errors.append(np.hypot(*(positions[1] - positions[0])) - distance)
+    assert np.mean(errors) == pytest.approx(0.0, abs=0.06)
+
+
 def test_an_empty_tray_has_no_detections():
     rng = np.random.default_rng(3)
     floor = np.clip(rng.normal(150.0, 3.0, (188, 188, 3)), 0, 255).astype(np.uint8)
@@ -76,3 +107,23 @@ def test_crowded_grains_are_not_detected():
     glass, grains = detector.detect(image.color)
     assert glass.radii.size > 10
     assert grains.radii.size == 0
+
+
+@pytest.mark.parametrize('gap', [1.5, 2.5, 3.5])
+def test_a_bead_beside_another_is_not_displaced_by_it(gap):
+    """Outlines of neighbours that were taken for floor pushed beads 0.1 px away from them."""
+    shape, radius = (160, 640), 13.5
+    rng = np.random.default_rng(5)
+    angles = np.linspace(0.0, np.pi, 7, endpoint=False)
+    middles = np.column_stack([50.0 + 90.0 * np.arange(7), np.full(7, 80.0)]) + rng.random((7, 2))
+    apart = (radius + 0.5 * gap) * np.column_stack([np.cos(angles), np.sin(angles)])
+    centres = np.concatenate([middles - apart, middles + apart])
+    optics = Optics(shadow=0.0, codec='none')
+    picture = draw(shape, centres, np.full(14, radius), np.zeros(14, int), optics)
+    detector = BeadDetector(TrackingSettings(), load_trays()[1], 13500.0)
+    for frame in film([picture] * 6, optics):
+        found = detector.detect(frame)[0].positions
+    rows, columns = match_positions(centres, found, 3.0)
+    assert rows.size == 14
+    away = (found[columns] - centres[rows]) * np.concatenate([-apart, apart])[rows]
+    assert abs(np.mean(away.sum(axis=1)) / np.hypot(*apart[0])) < 0.03
