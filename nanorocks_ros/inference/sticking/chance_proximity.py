@@ -52,7 +52,9 @@ def encounter_rate(tray: Tray) -> float:
     return float(2.0 * math.sqrt(2.0) * reach * max(counts.sum() - 1.0, 0.0) / room)
 
 
-def chance_probability(path: ArrayLike, tolerance: ArrayLike, rate: float) -> NDArray[np.float64]:
+def chance_probability(
+    path: ArrayLike, tolerance: ArrayLike, rate: float, collision_path: ArrayLike | None = None
+) -> NDArray[np.float64]:
     """Probability that an encounter of two free beads looks like a body of two.
 
     Parameters
@@ -64,12 +66,18 @@ def chance_probability(path: ArrayLike, tolerance: ArrayLike, rate: float) -> ND
         Half of the range within which a component of their separation stayed.
     rate : float, [1/m]
         From `encounter_rate`.
+    collision_path : array_like, [m], optional
+        The path on which others may hit them, at the speed of the gas at each time; as `path` when
+        not given. A free pair keeps the speed it met with, though the gas around it cools.
 
     Returns
     -------
     ndarray, 0 to 1
     """
-    return _chance(path, _BOX_AREA * np.square(tolerance), _DISTURBED * rate)
+    area = _BOX_AREA * np.square(tolerance)
+    return _chance(
+        path, area, _DISTURBED * rate, path if collision_path is None else collision_path
+    )
 
 
 class CollisionRate:
@@ -148,18 +156,20 @@ def turning_chance_probability(
     """
     a, b = np.asarray(nearest, dtype=np.float64), np.asarray(farthest, dtype=np.float64)
     area = 4.0 * (b - a) * np.sqrt(b**2 - a**2)
-    return _chance(path, area, _PARTING * np.asarray(collision_rate, dtype=np.float64))
+    return _chance(path, area, _PARTING * np.asarray(collision_rate, dtype=np.float64), path)
 
 
-def _chance(path: ArrayLike, area: NDArray[np.float64], rate: ArrayLike) -> NDArray[np.float64]:
+def _chance(
+    path: ArrayLike, area: NDArray[np.float64], rate: ArrayLike, collision_path: ArrayLike
+) -> NDArray[np.float64]:
     """Probability that the displacement of free beads lies in an area, and nothing parts them.
 
     The displacement is Gaussian with the path W as the standard deviation of each component; its
-    density at 0 is 1 / (2 pi W^2). They are parted at a rate per path.
+    density at 0 is 1 / (2 pi W^2). They are parted at a rate per path, of collisions.
     """
     path_length = np.asarray(path, dtype=np.float64)
     slow = _PEAKED * area / (2.0 * math.pi * np.maximum(path_length, 1e-12) ** 2)
-    return np.asarray(np.minimum(1.0, slow) * np.exp(-np.asarray(rate) * path_length))
+    return np.asarray(np.minimum(1.0, slow) * np.exp(-np.asarray(rate) * collision_path))
 
 
 def expected_encounters(tray: Tray) -> float:

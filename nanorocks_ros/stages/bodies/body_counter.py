@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,12 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     max_chance_probability,
 )
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
-from nanorocks_ros.stages.bodies.body_sizes import bodies_of, possible_merges, size_statistics
+from nanorocks_ros.stages.bodies.body_sizes import (
+    bodies_of,
+    joined_bodies,
+    possible_merges,
+    size_statistics,
+)
 from nanorocks_ros.stages.bodies.bonds import Bond, BondFinder
 from nanorocks_ros.stages.bodies.comoving_bodies import ComovingBodies
 from nanorocks_ros.stages.bodies.frame_history import BodyFrame, FrameHistory
@@ -224,7 +230,9 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         known_ids = self._known_beads[2]
         members = {bead for pair in self._bonds for bead in pair}
         attached = self._reappearing.push(tracks, ids, members)
-        frame = BodyFrame(time, tracks.stamp_ns, beads.ids, beads.positions, known_ids, attached)
+        frame = BodyFrame(
+            time, tracks.stamp_ns, beads.ids, beads.positions, beads.radii, known_ids, attached
+        )
         self._frames.push(frame)
         if self._next_due_ns is None or tracks.stamp_ns >= self._next_due_ns:
             self._next_due_ns = tracks.stamp_ns + round(self._settings.interval * _NS)
@@ -245,7 +253,7 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         return max(self._max_chance, _MERGE_CHANCE_SHARE * self._merges_per_encounter())
 
     def _merge(self, bond: Bond, known_ns: int) -> Merge:
-        start = self._frames.start_of(bond)
+        start = self._start_of(bond)
         self._bonds[bond.ids] = bond._replace(start=start)
         joins = self._max_bodies() < self._tray.count - self._n_joins
         self._n_joins += joins
@@ -259,6 +267,13 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
             cycle=self._cycle,
             tracks=np.array(bond.ids, dtype=np.int32),
             joins=joins,
+        )
+
+    def _start_of(self, bond: Bond) -> float:
+        """Time since which two bodies are one, [s]."""
+        # Of larger bodies the two beads that were found need not be those that met.
+        return self._frames.touching_since(
+            self._frames.start_of(bond), partial(joined_bodies, bond, self._bonds.values())
         )
 
     def _max_bodies(self) -> int:

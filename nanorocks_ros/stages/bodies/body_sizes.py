@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.stages.bodies.bonds import Bond
+
 # Upper limits of the size classes; larger bodies are the last class.
 _SIZE_CLASSES = (1, 2, 3, 6)
 
@@ -63,6 +65,28 @@ def bodies_of(beads: Iterable[int], bonds: Iterable[tuple[int, int]]) -> dict[in
         low, high = sorted((find_root(first), find_root(second)))
         root[high] = low
     return {bead: find_root(bead) for bead in members}
+
+
+def joined_bodies(
+    bond: Bond, bonds: Iterable[Bond], time: float
+) -> tuple[frozenset[int], frozenset[int]]:
+    """The beads of the two bodies that a bond joins, as of a time, [s].
+
+    Parameters
+    ----------
+    bond : Bond
+    bonds : iterable of Bond
+        All bonds, with `bond` or without it. If others joined the two bodies before that time,
+        both results are the same.
+    time : float, [s]
+    """
+    older = [other.ids for other in bonds if other.start <= time and other.ids != bond.ids]
+    body_of = bodies_of({bead for ids in [bond.ids, *older] for bead in ids}, older)
+    first, second = (
+        frozenset(bead for bead, root in body_of.items() if root == body_of[own])
+        for own in bond.ids
+    )
+    return first, second
 
 
 def possible_merges(

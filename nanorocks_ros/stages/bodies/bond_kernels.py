@@ -39,7 +39,10 @@ and the time since the beads met, and the last time at which they touched in the
 SMALLER_RADIUS, DEFLECTED = 20, 21
 """Columns for the collisions of a pair; see `CollisionRate`."""
 
-_COLUMNS = 22
+COLLISION_PATH = 22
+"""Column of the path since the last restart, at the speed of the gas at each time."""
+
+_COLUMNS = 23
 
 
 class PairTable(NamedTuple):
@@ -68,7 +71,7 @@ class PairTable(NamedTuple):
         )
 
 
-def update_pairs(table: PairTable, time: float, beads: SeenBeads) -> PairTable:
+def update_pairs(table: PairTable, time: float, frame_step: float, beads: SeenBeads) -> PairTable:
     """Update all pairs with the next frame, and add those that touch now.
 
     Parameters
@@ -76,16 +79,22 @@ def update_pairs(table: PairTable, time: float, beads: SeenBeads) -> PairTable:
     table : PairTable
         Its values are changed.
     time : float, [s]
+    frame_step : float, [s]
+        Time since the last frame.
     beads : SeenBeads
     """
     since = time - table.values[:, LAST]
     weights = -np.expm1(-since[:, None] / _SMOOTHING_TIMES)
-    return _update_pairs(table, time, beads, weights)
+    return _update_pairs(table, time, frame_step, beads, weights)
 
 
 @compiled
 def _update_pairs(
-    table: PairTable, time: float, beads: SeenBeads, weights: NDArray[np.float64]
+    table: PairTable,
+    time: float,
+    frame_step: float,
+    beads: SeenBeads,
+    weights: NDArray[np.float64],
 ) -> PairTable:
     keys, first, second = touching_pairs(beads)
     rows = table.keys.size
@@ -103,7 +112,7 @@ def _update_pairs(
             count += 1
             continue
         touches = pair < keys.size and keys[pair] == table.keys[row]
-        both_seen = _update_pair(table, row, time, beads, weights[row], touches)
+        both_seen = _update_pair(table, row, time, frame_step, beads, weights[row], touches)
         pair += touches
         elapsed = time - table.values[row, LAST]
         waits = elapsed < _MAX_HIDDEN_TIME if not both_seen else False
@@ -133,6 +142,7 @@ def _update_pair(
     table: PairTable,
     k: int,
     time: float,
+    frame_step: float,
     beads: SeenBeads,
     weights: NDArray[np.float64],
     touches: bool,
@@ -143,12 +153,14 @@ def _update_pair(
     if i < 0 or j < 0:
         return False
     row = table.values[k]
-    step = time - row[LAST]
+    # While one bead was hidden, they may have parted and met again.
+    step = min(time - row[LAST], frame_step)
     row[TOLERANCE] = _TOLERANCE_SIGMAS * _combined_error(beads.errors, i, j)
     # A free pair keeps the speed it met with, though the gas cools as other beads stick.
     free_speed = math.sqrt(beads.variances[i] + beads.variances[j])
     row[SPEED] = max(row[SPEED], free_speed)
     row[PATH] += row[SPEED] * step
+    row[COLLISION_PATH] += free_speed * step
     row[LAST] = time
     row[TURNING_PATH] += free_speed * step
     _update_distance(row, beads, i, j, weights[0])
@@ -245,7 +257,7 @@ def restart_pair(row: NDArray[np.float64], time: float) -> None:
     """Restart the statistics of a pair at its smoothed separation."""
     for c in range(2):
         row[LOW + c] = row[HIGH + c] = row[OFFSET + c] = row[SMOOTHED + c]
-    row[PATH], row[START], row[LAST_TOGETHER] = 0.0, time, time
+    row[PATH], row[COLLISION_PATH], row[START], row[LAST_TOGETHER] = 0.0, 0.0, time, time
 
 
 @compiled

@@ -12,6 +12,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
 )
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.bodies.bond_kernels import (
+    COLLISION_PATH,
     DEFLECTED,
     FARTHEST,
     HIGH,
@@ -89,6 +90,7 @@ class BondFinder:
     def clear(self) -> None:
         """Forget all pairs."""
         self._table = PairTable.empty()
+        self._last_time = 0.0
 
     def push(
         self, time: float, beads: SeenBeads, max_chance: float
@@ -109,7 +111,8 @@ class BondFinder:
         broken : list of (int, int)
             Bonds that broke.
         """
-        self._table = update_pairs(self._table, time, beads)
+        frame_step, self._last_time = time - self._last_time, time
+        self._table = update_pairs(self._table, time, frame_step, beads)
         return self._new_bonds(time, max_chance), self._broken_bonds(time)
 
     def add_bonds(self, time: float, beads: SeenBeads, bonds: list[Bond]) -> None:
@@ -136,7 +139,7 @@ class BondFinder:
         """Probabilities that free beads keep their separation."""
         ranges = 0.5 * (rows[:, HIGH : HIGH + 2] - rows[:, LOW : LOW + 2]).max(axis=1)
         ranges = np.maximum(ranges, _MIN_RANGE * rows[:, TOLERANCE])
-        return chance_probability(rows[:, PATH], ranges, self._rate)
+        return chance_probability(rows[:, PATH], ranges, self._rate, rows[:, COLLISION_PATH])
 
     def _turning_chances(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Probabilities that free beads keep their distance within the range that was seen."""

@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from nanorocks_ros.stages.bodies.touching_pairs import MAX_DISTANCE
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.stages.bodies.bonds import Bond
@@ -28,6 +32,7 @@ class BodyFrame(NamedTuple):
     ids : ndarray of int64, (n,)
         Numbers of the visible beads, ascending.
     positions : ndarray (n, 2), [m]
+    radii : ndarray (n,), [m]
     known_ids : frozenset of int
         Numbers of the visible and of the occluded beads.
     attached : tuple of (int, int)
@@ -38,6 +43,7 @@ class BodyFrame(NamedTuple):
     stamp_ns: int
     ids: NDArray[np.int64]
     positions: NDArray[np.float64]
+    radii: NDArray[np.float64]
     known_ids: frozenset[int]
     attached: tuple[tuple[int, int], ...]
 
@@ -79,6 +85,44 @@ class FrameHistory:
             if misses > _MAX_MISSES:
                 break
         return start
+
+    def touching_since(
+        self, start: float, bodies: Callable[[float], tuple[frozenset[int], frozenset[int]]]
+    ) -> float:
+        """Time since which some beads of two bodies may touch in the image, [s].
+
+        Bodies that turn show other beads beside each other than those that met.
+
+        Parameters
+        ----------
+        start : float, [s]
+            The frames are searched backwards from here. A short jump of a track, or beads that
+            are hidden for a frame or two, do not end the search.
+        bodies : callable
+            The beads of both bodies at a time. The search ends where they are one body, or single
+            beads, whose own separation says when they met.
+        """
+        found, misses = start, 0
+        for frame in reversed(self._frames):
+            if frame.time >= start:
+                continue
+            if _may_touch(frame, *bodies(frame.time)):
+                found, misses = frame.time, 0
+            else:
+                misses += 1
+            if misses > _MAX_MISSES:
+                break
+        return found
+
+
+def _may_touch(frame: BodyFrame, one: frozenset[int], other: frozenset[int]) -> bool:
+    """Whether a visible bead of one body may touch one of another."""
+    if one == other or len(one) == len(other) == 1:
+        return False
+    first, second = (np.isin(frame.ids, list(body)) for body in (one, other))
+    separations = frame.positions[first][:, np.newaxis] - frame.positions[second]
+    reach = MAX_DISTANCE * (frame.radii[first][:, np.newaxis] + frame.radii[second])
+    return bool((np.linalg.norm(separations, axis=-1) < reach).any())
 
 
 def _has_separation(frame: BodyFrame, bond: Bond) -> bool:

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
 
-# Largest distance of two beads that may touch, in sums of radii, plus a multiple of the errors of
-# positions and radii.
-_MAX_DISTANCE, _DISTANCE_SIGMAS = 1.03, 2.0
+MAX_DISTANCE = 1.03
+"""Largest distance of two beads that may touch, in sums of radii, but for errors."""
+
+# Errors of positions and radii that this distance may be larger by.
+_DISTANCE_SIGMAS = 2.0
 # Relative error of a radius from an uneven outline and the light.
 _OUTLINE_ERROR = 0.02
 SHIFT = 32
@@ -64,7 +66,7 @@ def touching_pairs(
         )
         largest_reach = max(
             largest_reach,
-            _MAX_DISTANCE * beads.radii[i] + _DISTANCE_SIGMAS * math.sqrt(variances[i]),
+            MAX_DISTANCE * beads.radii[i] + _DISTANCE_SIGMAS * math.sqrt(variances[i]),
         )
     # Sorted by column, so that only beads nearby are compared.
     order = np.argsort(beads.positions[:, 0].copy())
@@ -101,12 +103,11 @@ def _may_touch(
     distance = math.sqrt(dx * dx + dy * dy)
     radii = beads.radii[i] + beads.radii[j]
     slack = _DISTANCE_SIGMAS * math.sqrt(variances[i] + variances[j])
-    if distance >= _MAX_DISTANCE * radii + slack:
+    if distance >= MAX_DISTANCE * radii + slack:
         return False
     height_difference = max(beads.height - radii, 0.0)
     return (
         distance
-        > math.sqrt(max(radii * radii - height_difference * height_difference, 0.0))
-        / _MAX_DISTANCE
+        > math.sqrt(max(radii * radii - height_difference * height_difference, 0.0)) / MAX_DISTANCE
         - slack
     )

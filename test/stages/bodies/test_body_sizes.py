@@ -5,11 +5,30 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.bodies.body_sizes import bodies_of, size_statistics
+from nanorocks_ros.stages.bodies.body_sizes import bodies_of, joined_bodies, size_statistics
+from nanorocks_ros.stages.bodies.bonds import Bond
 
 
 def test_beads_bonded_to_an_unlisted_bead_are_one_body():
     assert bodies_of([1, 2, 3, 4], [(2, 9), (3, 9)]) == {1: 1, 2: 2, 3: 2, 4: 4}
+
+
+def _bond(first, second, start):
+    return Bond((first, second), start, (2e-3, 0.0), 1e-4)
+
+
+def test_a_bond_joins_the_bodies_of_that_time():
+    bond = _bond(1, 2, 1.0)
+    bonds = [bond, _bond(2, 3, 0.5), _bond(3, 4, 0.8)]
+    assert joined_bodies(bond, bonds, 0.9) == ({1}, {2, 3, 4})
+    assert joined_bodies(bond, bonds, 0.6) == ({1}, {2, 3})
+    assert joined_bodies(bond, bonds, 0.4) == ({1}, {2})
+
+
+def test_a_bond_between_beads_of_one_body_has_it_on_both_sides():
+    bond = _bond(1, 3, 1.0)
+    one, other = joined_bodies(bond, [_bond(1, 2, 0.2), _bond(2, 3, 0.3)], 0.9)
+    assert one == other == {1, 2, 3}
 
 
 def test_sizes_are_means_over_bodies_and_over_beads():

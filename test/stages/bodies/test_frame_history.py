@@ -25,6 +25,7 @@ def _history(separation, n_frames):
             stamp_ns=round(k * STEP * 1e9),
             ids=np.array(ids, dtype=np.int64),
             positions=np.array(positions),
+            radii=np.full(len(ids), 1e-3),
             known_ids=frozenset((2, 5)),
             attached=(),
         )
@@ -52,3 +53,23 @@ def test_three_frames_without_the_separation_end_the_search(gap):
 def test_frames_older_than_ten_seconds_are_forgotten():
     history = _history(lambda _: 2e-3, 121)
     assert history.start_of(BOND._replace(start=12.0)) == pytest.approx(2.0)
+
+
+def test_bodies_touch_since_any_two_of_their_beads_do():
+    history = _history(lambda k: 2.04e-3 if k >= 8 else 3e-3, 25)
+    both = frozenset((2, 7)), frozenset((5,))
+    assert history.touching_since(2.0, lambda _: both) == pytest.approx(0.8)
+
+
+def test_the_search_ends_where_both_bodies_are_single_beads():
+    history = _history(lambda k: 2.04e-3 if k >= 8 else 3e-3, 25)
+
+    def bodies(time):
+        return frozenset((2, 7) if time >= 1.15 else (2,)), frozenset((5,))
+
+    assert history.touching_since(2.0, bodies) == pytest.approx(1.2)
+
+
+def test_beads_that_are_one_body_already_do_not_move_the_start():
+    history = _history(lambda _: 2e-3, 25)
+    assert history.touching_since(2.0, lambda _: (frozenset((2, 5)), frozenset((2, 5)))) == 2.0
