@@ -258,7 +258,11 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
     if isinstance(record, CorEstimate) and (reason := reason_of(record)) is not None:
         elements['reason'] = reason.text
     if isinstance(record, CorEstimate) and record.headline is Headline.CONTACTS:
-        elements['headline_reason'] = reason_for_contacts(record.tension, record.wall_friction)
+        elements['headline_reason'] = reason_for_contacts(
+            record.tension,
+            record.wall_friction,
+            accelerated=Quality.ACCELERATED in record.quality,
+        )
     return elements
 
 

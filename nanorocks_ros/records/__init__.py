@@ -11,6 +11,7 @@ from nanorocks_ros.records.cluster_estimates import BodyEstimate as BodyEstimate
 from nanorocks_ros.records.cluster_estimates import ClusterEstimate as ClusterEstimate
 from nanorocks_ros.records.cluster_estimates import Merge as Merge
 from nanorocks_ros.records.cluster_estimates import sizes_disagree as sizes_disagree
+from nanorocks_ros.records.contact_records import FreeFlight as FreeFlight
 from nanorocks_ros.records.contact_records import PairCollision as PairCollision
 from nanorocks_ros.records.contact_records import Rebound as Rebound
 from nanorocks_ros.records.frames import NS as NS
@@ -19,6 +20,7 @@ from nanorocks_ros.records.frames import MotionMask as MotionMask
 from nanorocks_ros.records.frames import Notice as Notice
 from nanorocks_ros.records.frames import TrayImage as TrayImage
 from nanorocks_ros.records.frames import TrayState as TrayState
+from nanorocks_ros.records.headlines import AGREEMENT_TENSION as AGREEMENT_TENSION
 from nanorocks_ros.records.headlines import Headline as Headline
 from nanorocks_ros.records.headlines import headline_in_words as headline_in_words
 from nanorocks_ros.records.headlines import headline_of as headline_of

@@ -1,11 +1,11 @@
-"""Single contacts: rebounds from walls and collisions of two beads.
+"""Single contacts, rebounds from walls and collisions of two beads, and flights between them.
 
 Tested by ``test/wire/test_array_layouts.py``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +39,16 @@ class Rebound:
         Of the wall along the normal, to the outside; its error is in both speeds.
     place : ndarray (2,), [m]
         Of the centre of the bead, from the corner of the tray.
+    drag : float, [1/s]
+        Of the gas, for the first species: taken out of both speeds, which are those at the
+        contact.
+    incoming_drag_time, outgoing_drag_time : float, [s]
+        From the middle of each flight to the contact, times the drag of the bead over that of the
+        first species: by how much a change of the drag changes the logarithm of each speed.
+    friction_length : float, [m]
+        Time from the middle of one flight to that of the other, times the temperature of the
+        species, over the speed of the bead: what friction of floor and lid takes off beside the
+        contact, over the friction rate.
     """
 
     stamp_ns: int
@@ -54,6 +64,10 @@ class Rebound:
     tangential_error: float
     wall_velocity: Measured
     place: NDArray[np.float64]
+    drag: float = 0.0
+    incoming_drag_time: float = 0.0
+    outgoing_drag_time: float = 0.0
+    friction_length: float = 0.0
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -86,6 +100,12 @@ class PairCollision:
         Of the tray, which limits how far beads can be above each other.
     place : ndarray (2,), [m]
         Of the first centre, from the corner of the tray.
+    drag : float, [1/s]
+        As of `Rebound`.
+    before_drag_times, after_drag_times : ndarray (2,), [s]
+        Of each bead, as `Rebound.incoming_drag_time`.
+    friction_length : float, [m]
+        Mean of both beads, as of `Rebound`.
     """
 
     stamp_ns: int
@@ -105,6 +125,53 @@ class PairCollision:
     temperatures: NDArray[np.float64]
     height: float
     place: NDArray[np.float64]
+    drag: float = 0.0
+    before_drag_times: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    after_drag_times: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    friction_length: float = 0.0
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FreeFlight:
+    """A flight of a bead without contacts, long enough to show how it is bent.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Of its last position.
+    tray, cycle, track, species : int
+    duration : float, [s]
+    points : int
+        Number of positions.
+    mean_velocity, mean_acceleration : ndarray (2,), [m/s], [m/s^2]
+        Of a parabola: in its middle, and everywhere.
+    acceleration_error : float, [m/s^2]
+        Of each component.
+    relative_drag : float
+        Drag of the bead over that of the first species: as the inverse of density times diameter
+        squared.
+    reduced_chi_square : float
+        Of a parabola.
+    temperature : float, [m^2/s^2]
+        Of the species in the middle: mean square of a horizontal component.
+    """
+
+    stamp_ns: int
+    tray: int
+    cycle: int = 0
+    track: int
+    species: int
+    duration: float
+    points: int
+    mean_velocity: NDArray[np.float64]
+    mean_acceleration: NDArray[np.float64]
+    acceleration_error: float
+    relative_drag: float
+    reduced_chi_square: float
+    temperature: float
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

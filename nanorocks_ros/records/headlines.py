@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nanorocks_ros.records.values import Measured
 
-AGREEMENT_TENSION = 2.0
-"""Standard deviations up to which decay and contacts are taken together: of cycles in which all
-is as assumed 5 % are above."""
+AGREEMENT_TENSION = 2.45
+"""Tension up to which decay and contacts are taken together: of cycles in which all is as assumed
+5 % are above, since its square is the chi square of two restitutions that both determine."""
 FRICTION_SIGMAS = 1.645
 """Standard deviations above 0 at which walls have friction: 5 % of smooth walls are above."""
 
@@ -57,26 +57,28 @@ def headline_of(contacts: int, tension: float, friction: Measured) -> Headline:
     return Headline.CONTACTS if is_tense(tension) or walls_rub(friction) else Headline.JOINT
 
 
-def reason_for_contacts(tension: float, friction: Measured) -> str:
+def reason_for_contacts(tension: float, friction: Measured, *, accelerated: bool = False) -> str:
     """Why a restitution is that of contacts alone; empty where the decay agrees."""
-    reasons = []
+    reasons = ['an acceleration drives the beads'] if accelerated else []
     if is_tense(tension):
         reasons.append(f'decay and contacts differ by {tension:.1f} standard deviations')
     if walls_rub(friction):
         reasons.append(
-            f'rebounds show a friction of {friction.value:.3f} +- {friction.error:.3f}, and the '
-            'simulated decays have none'
+            f'rebounds show a friction of {friction.value:.3f} +- {friction.error:.3f}, which '
+            'slows the gas as less restitution would'
         )
     return ' and '.join(reasons)
 
 
-def headline_in_words(headline: Headline, tension: float, friction: Measured) -> str:
+def headline_in_words(
+    headline: Headline, tension: float, friction: Measured, *, accelerated: bool = False
+) -> str:
     """The source of a restitution in a phrase, with the reason where it is not all there is."""
     match headline:
         case Headline.JOINT:
             return 'decay and contacts together'
         case Headline.CONTACTS:
-            reason = reason_for_contacts(tension, friction)
+            reason = reason_for_contacts(tension, friction, accelerated=accelerated)
             return 'contacts alone' + (f', since {reason}' if reason else '')
         case Headline.DECAY:
             return 'decay alone'

@@ -82,6 +82,7 @@ class Quality(IntFlag):
     UNCALIBRATED = 1024
     INCONSISTENT = 2048
     DOUBTFUL_SCALE = 4096
+    ACCELERATED = 8192
 
     def names(self) -> list[str]:
         """Names of the flags that are set, in lower case."""

@@ -18,8 +18,10 @@ from nanorocks_ros.records.quality_flags import (
 from nanorocks_ros.records.values import (
     UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
+    UNKNOWN_MEASURED_INTERVAL,
     Interval,
     Measured,
+    MeasuredInterval,
 )
 
 
@@ -85,6 +87,12 @@ class CorEstimate:
     wall_friction : Measured
         Coefficient of friction of the side walls, at least, from the tangential speeds of
         rebounds.
+    drag : Measured, [1/s]
+        Rate at which a gas slows beads of the first species, from free flights; decay and contacts
+        are corrected for it.
+    acceleration : MeasuredInterval, [m/s^2]
+        Size of the acceleration that all beads have in common, in the image plane, with its
+        limits.
     """
 
     stamp_ns: int
@@ -119,3 +127,5 @@ class CorEstimate:
     contact_restitution: Interval = UNKNOWN_INTERVAL
     contact_wall_restitution: Interval = UNKNOWN_INTERVAL
     wall_friction: Measured = UNKNOWN_MEASURED
+    drag: Measured = UNKNOWN_MEASURED
+    acceleration: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL

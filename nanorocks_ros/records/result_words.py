@@ -102,6 +102,11 @@ FLAGS = {
         'says which',
         'correct what the notice names: --preprocess-pixels-per-metre, or sizes in the trays file',
     ),
+    Quality.ACCELERATED: Words(
+        'all beads are accelerated the same way, which changes their speeds: the tray falls or '
+        'turns',
+        'the restitutions are those of contacts alone; compare acceleration with the flight log',
+    ),
 }
 """Meaning and remedy of each flag."""
 
@@ -155,25 +160,21 @@ def size_flag(autocorrelation: MeasuredInterval, tracks: Measured) -> FlagWords 
 
 
 class WallPrior(NamedTuple):
-    """Ends of the flat prior of the walls, and from where on decays were simulated."""
+    """Ends of the flat prior of the walls."""
 
     lowest: float = 0.0
     highest: float = 1.0
-    simulated: float = 0.0
 
 
 def wall_flag(cor: CorEstimate, prior: WallPrior) -> FlagWords | None:
     """A flag where the walls lean on an end of their prior, with its name; None else."""
     walls = cor.wall_restitution
     low, high = prior.lowest, prior.highest
-    name, remedy = 'prior.min_wall_restitution', 'lower --prior-min-wall-restitution'
-    if cor.headline is not Headline.CONTACTS and prior.simulated > low:
-        low, name = prior.simulated, 'the lowest for which decays were simulated'
-        remedy = 'use contacts, film closer or at a higher rate, or give the walls by both ends,'
+    remedy = 'lower --prior-min-wall-restitution (0.5 at least)'
     # A likelihood that falls from the edge on, flat, half-normal or exponential, puts the lower
     # quantile of 0.025 at 0.03, 0.014, 0.007 of the upper one; with its peak inside, it is more.
     if walls.lower - low < _AT_EDGE * (walls.upper - low):
-        place = f'{low:g} ({name})'
+        place = f'{low:g} (prior.min_wall_restitution)'
     elif high < 1.0 and high - walls.upper < _AT_EDGE * (high - walls.lower):
         place = f'{high:g} (prior.max_wall_restitution)'
         remedy = 'raise --prior-max-wall-restitution'
@@ -205,7 +206,9 @@ def reason_of(cor: CorEstimate) -> Words | None:
         )
     contacts = f'{cor.rebounds} rebounds and {cor.collisions} collisions'
     if cor.headline is Headline.CONTACTS:
-        why = reason_for_contacts(cor.tension, cor.wall_friction)
+        why = reason_for_contacts(
+            cor.tension, cor.wall_friction, accelerated=Quality.ACCELERATED in cor.quality
+        )
         return Words(
             f'only contacts count{", since " if why else ""}{why}, and {contacts} tell too little '
             'of the beads',

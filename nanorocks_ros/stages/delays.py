@@ -6,6 +6,7 @@ from nanorocks_ros.records import (
     NS,
     BodyEstimate,
     ClusterEstimate,
+    FreeFlight,
     Merge,
     PairCollision,
     Rebound,
@@ -23,6 +24,8 @@ KNOWN_AFTER_NS: dict[type, int] = {
     # pictures a second.
     Rebound: 2 * NS,
     PairCollision: 2 * NS,
+    # After its last position, until the next flight has begun.
+    FreeFlight: 2 * NS,
     Merge: _MERGE_NS,
     BodyEstimate: _MERGE_NS,
     # The middle of a window of up to 3 s of tracks. Speeds by the structure function also wait

@@ -45,6 +45,8 @@ _ARRAYS_OF_BEADS = {
     'temperature_{}': 'temperatures',
     'before_{}_error': 'before_errors',
     'after_{}_error': 'after_errors',
+    'before_{}_drag_time': 'before_drag_times',
+    'after_{}_drag_time': 'after_drag_times',
 }
 _INTEGERS = frozenset(('tracks', 'species'))
 
@@ -81,7 +83,7 @@ _ARRAY_PLACES = {
     **{f'bodies_of_{size}': Place('sizes', (k,)) for k, size in enumerate(_SIZES)},
     **{
         f'{array}_{letter}': Place(array, (axis,))
-        for array in ('separation', 'place')
+        for array in ('separation', 'place', 'mean_velocity', 'mean_acceleration')
         for axis, letter in enumerate(_AXES)
     },
 }

@@ -70,6 +70,7 @@ PRODUCTS = (
     ),
     Product(record=records.Rebound, topic=topics.REBOUND),
     Product(record=records.PairCollision, topic=topics.COLLISION),
+    Product(record=records.FreeFlight, topic=topics.FLIGHT),
     Product(record=records.BodyEstimate, topic=topics.BODIES),
     Product(record=records.Merge, topic=topics.MERGE),
     Product(

@@ -86,6 +86,12 @@ REBOUND = Topic(
 COLLISION = Topic(
     name='tray_{tray}/collision', type=ARRAY, depth=1000, doc='PairCollision: of two beads'
 )
+FLIGHT = Topic(
+    name='tray_{tray}/flight',
+    type=ARRAY,
+    depth=1000,
+    doc='FreeFlight: of a bead between two contacts, with its bend',
+)
 BODIES = Topic(
     name='tray_{tray}/bodies',
     type=ARRAY,

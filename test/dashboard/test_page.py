@@ -9,7 +9,8 @@ import pytest
 
 from nanorocks_ros.dashboard.tray_pictures import encoded
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import CorStatus, Interval, Quality
+from nanorocks_ros.records import CorStatus, Interval, Measured, MeasuredInterval, Quality
+from nanorocks_ros.settings import PriorSettings, priors_in_words
 
 WIDE = {'width': 1440, 'height': 900}
 PHONE = {'width': 390, 'height': 844}
@@ -92,6 +93,9 @@ def test_numbers_are_those_of_the_estimate_with_units(look, full, results):
     text_is(page, '#haff', f'{cor.haff_time.value:.2f} s')
     text_is(page, '#cluster', f'{cluster.combined_size.value:.2f}')
     text_is(page, '#cluster', f'±\u00a0{cluster.combined_size.error:.2f}')
+    text_is(page, '#drag', f'{cor.drag.value:.4f} 1/s')
+    text_is(page, '#drag', f'±\u00a0{cor.drag.error:.4f}')
+    text_is(page, '#acceleration', f'< {1e3 * cor.acceleration.upper:.3f} mm/s²')
     text_is(page, '#about', '15 acrylic 2 mm')
     text_is(page, '#health', '1 node, well')
     for chart in ('speed', 'cor', 'cluster'):
@@ -148,6 +152,48 @@ def test_what_is_wrong_or_not_told_is_said_in_words(look, serve, results):
     text_is(page, '.node', 'silent for 4 s')
     text_is(page, '.node', 'before: 1 frame waiting')
     assert 'working' not in page.locator('.node summary').inner_text()
+
+
+def test_an_acceleration_that_matters_is_told_by_its_size(look, serve, results):
+    server = serve()
+    server.take(results.speeds[-1])
+    accelerated = replace(
+        results.cors[-1],
+        quality=Quality.ACCELERATED,
+        acceleration=MeasuredInterval(2e-3, 1e-4, 1.8e-3, 2.2e-3),
+        drag=Measured(0.0312, 0.0121),
+    )
+    server.take(accelerated)
+    page = look(server.url)
+    text_is(page, '#acceleration', '2.0 mm/s²')
+    text_is(page, '#acceleration', '[1.8, 2.2]')
+    text_is(page, '#drag', '0.031 1/s')
+    server.take(replace(results.cors[-1], drag=Measured(), acceleration=MeasuredInterval()))
+    text_is(page, '#acceleration', 'not known yet')
+    text_is(page, '#drag', 'not known yet')
+
+
+def test_the_priors_are_those_of_the_node_that_estimates_this_tray(look, full):
+    page = look(full.url)
+    text_is(page, '#cor', 'final')
+    assert not page.locator('#priors').is_visible()
+    of_graph, of_other = (
+        priors_in_words(replace(PriorSettings(), friction=friction)) for friction in (0.0, 0.05)
+    )
+    full.diagnose(
+        (name, 0, 'working', [(f'tray {tray} COR', '0.9'), ('priors', priors)])
+        for name, tray, priors in (
+            ('/other/pipeline', 1, of_other),
+            ('/nanorocks/haff_fitter', 1, of_graph),
+            ('/nanorocks/other', 2, of_other),
+        )
+    )
+    text_is(page, '#priors', of_graph.replace('+-', '±'))
+    page.keyboard.press('2')
+    text_is(page, '#priors', of_other.replace('+-', '±'))
+    page.keyboard.press('5')
+    text_is(page, '#title', 'Tray 5')
+    page.wait_for_selector('#priors', state='hidden')
 
 
 def test_whoever_opens_the_page_late_sees_the_same(look, full):
@@ -216,12 +262,18 @@ def test_changes_are_said_to_those_who_listen(look, full, results):
 @pytest.mark.parametrize('size', [WIDE, PHONE, NARROW], ids=['wide', 'phone', 'narrow'])
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
+    values = [('tray 1 COR', '0.9'), ('priors', priors_in_words(PriorSettings()))]
     full.diagnose(
-        [('/a', 1, 'a warning ' * 9, []), ('/b' * 30, 2, 'x' * 200, [('k' * 50, 'v' * 90)])]
+        [
+            ('/a', 1, 'a warning ' * 9, []),
+            ('/b' * 30, 2, 'x' * 200, [('k' * 50, 'v' * 90)]),
+            ('/nanorocks/pipeline', 0, 'working', values),
+        ]
     )
     page = look(full.url, color_scheme=scheme, viewport=size)
     text_is(page, '#cor', 'final')
     text_is(page, '#health', '1 error')
+    text_is(page, '#priors', 'beads 0 to 1')
     page.locator('summary').first.click()
     contrasts = page.evaluate(CONTRASTS)
     assert len(contrasts) > 30

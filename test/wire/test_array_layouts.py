@@ -43,7 +43,14 @@ EPOCH = 1_700_000_000_000_000_000
 
 # Elements that are part of an array in the record.
 WHOLE = {
-    **{f'{name}_{axis}': name for name in ('place', 'separation') for axis in 'xy'},
+    **{
+        f'{name}_{axis}': name
+        for name in ('place', 'separation', 'mean_velocity', 'mean_acceleration')
+        for axis in 'xy'
+    },
+    **{
+        f'{name}_{k}_drag_time': f'{name}_drag_times' for name in ('before', 'after') for k in '12'
+    },
     **{f'{name}_{k}_{axis}': name for name in ('before', 'after') for k in '12' for axis in 'xy'},
     **{
         f'{name}_{k}_error': f'{name}_errors'

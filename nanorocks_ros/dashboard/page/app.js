@@ -16,6 +16,7 @@ const trays = new Map();
 const fromAddress = () => Number(/^#tray-(\d+)$/.exec(location.hash)?.[1]) || null;
 
 let chosen = fromAddress();
+let namespace = '';
 let pending = false;
 let saidAt = 0;
 let saidOf = '';
@@ -30,7 +31,8 @@ const clusters = new ClusterChart(at('cluster-chart'));
 
 const link = new Link({
   greeted(said) {
-    at('namespace').textContent = said.namespace;
+    namespace = said.namespace;
+    at('namespace').textContent = namespace;
     at('version').textContent = `nanorocks_ros ${said.version}`;
     trays.clear();
     nodes.forget();
@@ -95,6 +97,7 @@ function drawTray(tray) {
   at('canvas').setAttribute('aria-label', `Picture of tray ${chosen}${pressed('tracks') ? ' with its tracks' : ''}`);
   document.title = `Tray ${chosen}, NanoRocks`;
   drawNumbers(tray);
+  drawPriors(chosen);
   speeds.draw(tray);
   cors.draw(tray);
   clusters.draw(tray);
@@ -135,6 +138,14 @@ function drawNumbers(tray) {
     size ? `beads per body ${words.give(cluster.combined_size_error, (one) => one.toFixed(2))}` : 'not known yet',
   );
   number('sticking', ...(cluster ? words.sticking(cluster) : ['', 'not known yet']));
+  number('drag', ...words.drag(cor));
+  number('acceleration', ...words.acceleration(cor));
+}
+
+function drawPriors(number) {
+  const priors = nodes.priorsOf(number, namespace);
+  at('priors').hidden = !priors;
+  at('priors').textContent = priors ? `Assumed before anything is measured (priors): ${priors.replaceAll('+-', '±')}` : '';
 }
 
 const final = ([, value, lower, upper]) =>

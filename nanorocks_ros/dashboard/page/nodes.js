@@ -42,6 +42,16 @@ export class Nodes {
     this.heardAt = performance.now();
   }
 
+  /** The priors of the node of this graph that estimates the restitutions of a tray. */
+  priorsOf(tray, namespace) {
+    for (const { name, values } of this.nodes) {
+      const known = new Map(values);
+      const home = name.slice(0, name.lastIndexOf('/')) || '/';
+      if (home === namespace && known.has(`tray ${tray} COR`) && known.has('priors')) return known.get('priors');
+    }
+    return '';
+  }
+
   draw() {
     const since = (performance.now() - this.heardAt) / 1e3;
     const states = this.nodes.map((node) => {

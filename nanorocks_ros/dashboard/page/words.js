@@ -87,6 +87,25 @@ export function sticking(cluster) {
   }
 }
 
+/** How fast a gas slows the beads, and what is to be said of it. */
+export function drag(cor) {
+  if (!cor || !known(cor.drag)) return ['', 'not known yet'];
+  const show = (value) => value.toFixed(cor.drag_error >= 0.01 ? 3 : 4);
+  const error = give(cor.drag_error, show, ', ');
+  return [`${show(cor.drag)} 1/s`, `${error}part of its speed that a bead in flight loses each second`];
+}
+
+/** What drives all beads the same way: an upper limit; its size where that matters. */
+export function acceleration(cor) {
+  if (!cor || !known(cor.acceleration_upper)) return ['', 'not known yet'];
+  const mm = (value) => (1e3 * value).toFixed(value >= 1e-3 ? 1 : 3);
+  if (cor.quality.includes('accelerated')) {
+    const between = interval(cor.acceleration_lower, cor.acceleration_upper, mm);
+    return [`${mm(cor.acceleration)} mm/s²`, `${between} of all beads: the tray falls or turns`];
+  }
+  return [`< ${mm(cor.acceleration_upper)} mm/s²`, 'of all beads alike; 0 where the tray floats'];
+}
+
 /** What a tray does at present: a state for its colour, words, and fewer words. */
 export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;

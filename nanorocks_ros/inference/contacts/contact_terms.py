@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import marginal, pair_table, rebound_table
-from nanorocks_ros.inference.contacts.wall_friction import friction_table, wall_friction
+from nanorocks_ros.inference.contacts.dragged_contacts import loss_beside_contacts, loss_sums
+from nanorocks_ros.inference.contacts.wall_friction import (
+    friction_likelihood,
+    friction_table,
+    wall_friction,
+)
+from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import UNKNOWN_MEASURED, Measured, PairCollision, Rebound
 
@@ -21,15 +27,13 @@ if TYPE_CHECKING:
 LOWEST_REBOUND = 0.5
 """Lowest restitution of the walls for which rebounds are compared."""
 
+NO_SLOWING = Slowing.by_drag(Measured(0.0, 0.0))
+"""Between contacts in a vacuum, and without friction."""
+
 # A single contact determines the bead restitution to 0.02 and the wall restitution to 0.003 at
 # best: a spline through these nodes represents sums of log likelihoods.
 _BEADS = np.linspace(0.0, 1.0, 101)
 _WALLS = np.linspace(LOWEST_REBOUND, 1.0, 501)
-# Where floor and lid rub, a flight loses speed between contact and the middle of the flight. One
-# of its hits changes the horizontal speed by about the friction, relative to that speed; more
-# than one bends the flight enough to end it. Before and after a rebound together: none to 1.4
-# hits, equally likely, so that walls read too low by this times the friction, and this scatter.
-_UNSEEN_HITS, _HITS_SPREAD = 0.7, 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +49,8 @@ class ContactTerms:
         common to all contacts that are added.
     friction : ndarray (m, n)
         Table of `friction_table`.
+    rebound_losses, collision_losses : ndarray (4,)
+        Sums of `loss_sums`.
     """
 
     rebounds: int
@@ -52,6 +58,8 @@ class ContactTerms:
     walls: NDArray[np.float64]
     beads: NDArray[np.float64]
     friction: NDArray[np.float64]
+    rebound_losses: NDArray[np.float64]
+    collision_losses: NDArray[np.float64]
 
     @classmethod
     def of(cls, contacts: Iterable[Rebound | PairCollision]) -> ContactTerms:
@@ -65,6 +73,8 @@ class ContactTerms:
             walls=rebound_table(rebounds, _WALLS),
             beads=pair_table(collisions, _BEADS),
             friction=friction_table(rebounds),
+            rebound_losses=loss_sums(rebounds),
+            collision_losses=loss_sums(collisions),
         )
 
     def __add__(self, other: ContactTerms) -> ContactTerms:
@@ -74,6 +84,8 @@ class ContactTerms:
             walls=self.walls + other.walls,
             beads=self.beads + other.beads,
             friction=self.friction + other.friction,
+            rebound_losses=self.rebound_losses + other.rebound_losses,
+            collision_losses=self.collision_losses + other.collision_losses,
         )
 
     @property
@@ -81,35 +93,41 @@ class ContactTerms:
         """Coefficient of friction of the side walls, from rebounds; unknown without any."""
         return wall_friction(self.friction) if self.rebounds else UNKNOWN_MEASURED
 
-    def rubbed_wall_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
-        """As `wall_likelihood`, where floor and lid may slow the flights by their friction.
+    @property
+    def friction_likelihood(self) -> Likelihood1D | None:
+        """Log likelihood of the friction that rebounds show; None without any."""
+        return friction_likelihood(self.friction) if self.rebounds else None
 
-        Their friction is taken to be that of the side walls.
-        """
-        likelihood = self.wall_likelihood(bias)
-        if likelihood is None:
-            return None
-        friction = self.wall_friction
-        most_likely = max(friction.value, 0.0)
-        spread = math.hypot(_HITS_SPREAD * most_likely, _UNSEEN_HITS * friction.error)
-        return likelihood.shifted(_UNSEEN_HITS * most_likely).convolved(spread)
-
-    def wall_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
+    def wall_likelihood(
+        self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
+    ) -> Likelihood1D | None:
         """Log likelihood of the wall restitution from rebounds; None without rebounds.
 
         Parameters
         ----------
         bias : float
             Standard deviation of a systematic error common to all of them.
+        slowing : Slowing, optional
+            What slows beads between contacts.
         """
         if not self.rebounds:
             return None
         term = Likelihood1D(restitution=_WALLS, log_likelihood=marginal(self.walls))
-        return term.convolved(bias)
+        return _slowed(term, loss_beside_contacts(self.rebound_losses, slowing), bias)
 
-    def bead_likelihood(self, bias: float = 0.0) -> Likelihood1D | None:
+    def bead_likelihood(
+        self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
+    ) -> Likelihood1D | None:
         """Log likelihood of the bead restitution from collisions, as `wall_likelihood`."""
         if not self.collisions:
             return None
         term = Likelihood1D(restitution=_BEADS, log_likelihood=marginal(self.beads))
-        return term.convolved(bias)
+        return _slowed(term, loss_beside_contacts(self.collision_losses, slowing), bias)
+
+
+def _slowed(term: Likelihood1D, loss: Measured, bias: float) -> Likelihood1D:
+    """A likelihood where speeds were lost beside contacts, and with a systematic error."""
+    best = float(term.restitution[np.argmax(term.log_likelihood)])
+    return term.shifted(best * math.expm1(loss.value)).convolved(
+        math.hypot(bias, best * loss.error)
+    )

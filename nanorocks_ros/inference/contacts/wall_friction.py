@@ -72,6 +72,11 @@ def friction_table(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
     return np.array(by_scale)
 
 
+def friction_likelihood(table: NDArray[np.float64]) -> Likelihood1D:
+    """Log likelihood over `FRICTIONS`; the table as for `wall_friction`."""
+    return Likelihood1D(restitution=FRICTIONS, log_likelihood=marginal(table))
+
+
 def wall_friction(table: NDArray[np.float64]) -> Measured:
     """Mean and standard deviation of the friction, for a flat prior over `FRICTIONS`.
 
@@ -80,6 +85,5 @@ def wall_friction(table: NDArray[np.float64]) -> Measured:
     table : ndarray (m, n)
         From `friction_table`, or a sum of such.
     """
-    likelihood = Likelihood1D(restitution=FRICTIONS, log_likelihood=marginal(table))
-    posterior = likelihood.posterior((float(FRICTIONS[0]), float(FRICTIONS[-1])))
+    posterior = friction_likelihood(table).posterior((float(FRICTIONS[0]), float(FRICTIONS[-1])))
     return Measured(posterior.mean, posterior.deviation)

@@ -1,4 +1,4 @@
-"""Detection of single contacts in tracks: rebounds from side walls and collisions of two beads."""
+"""Detection of contacts in tracks, rebounds from side walls and collisions, and of flights."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.records import Measured, PairCollision, Rebound, Tracks
+from nanorocks_ros.records import FreeFlight, Measured, PairCollision, Rebound, Tracks
 from nanorocks_ros.stages.contacts.flight_segments import FlightSegments, VelocityJump
 from nanorocks_ros.stages.contacts.line_fits import Intersection, intersect_lines
 from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_isolated_collision
-from nanorocks_ros.stages.contacts.segmentation_kernels import MAX_FLIGHT_POINTS
+from nanorocks_ros.stages.contacts.track_buffer import MAX_FLIGHT_POINTS
 from nanorocks_ros.stages.contacts.tray_history import TrayHistory
 from nanorocks_ros.stages.contacts.unmatched_jumps import UnmatchedJumps
+from nanorocks_ros.stages.flights.free_flights import free_flight
+from nanorocks_ros.stages.flights.relative_drag import relative_drag
+from nanorocks_ros.stages.flights.running_drag import RunningDrag
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
@@ -38,21 +41,29 @@ _MIN_DISTANCE, _MAX_DISTANCE = 0.9, 1.05
 _TIME_TOLERANCE = 0.3
 
 
-class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
-    """Finds rebounds and collisions in the tracks of one tray.
+Found = Rebound | PairCollision | FreeFlight
+_NO_DRAG = Measured(0.0, 1.0)
+
+
+class ContactFinder(RestartingStage[Tracks, Found]):
+    """Finds rebounds, collisions and the free flights between them in the tracks of one tray.
 
     A contact is complete when the flight after it ends, or is 48 positions long: at most 1.6 s
-    later at 30 frames/s.
+    later at 30 frames/s. Lines are fitted in the clock of the gas, by the drag that the flights
+    so far show.
 
     Parameters
     ----------
     tray : Tray
+    drag : Measured, optional, [1/s]
+        Prior of the drag of the gas.
     """
 
     clock = Tracks
 
-    def __init__(self, tray: Tray) -> None:
+    def __init__(self, tray: Tray, drag: Measured = _NO_DRAG) -> None:
         self._tray = tray
+        self._prior = drag
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
@@ -62,8 +73,10 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
         self._segments = FlightSegments(self._tray)
         self._history = TrayHistory(3 * MAX_FLIGHT_POINTS)
         self._unmatched = UnmatchedJumps()
+        self._drag = RunningDrag(self._prior)
+        self._segments.use_drag(self._drag.drag)
 
-    def _process(self, record: Tracks) -> tuple[Rebound | PairCollision, ...]:
+    def _process(self, record: Tracks) -> tuple[Found, ...]:
         """Add the tracks of a frame and return the contacts that are complete now."""
         if self._first_ns is None:
             self._first_ns = record.stamp_ns
@@ -71,9 +84,24 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
         self._history.push(time, record)
         jumps = self._segments.push(time, record, _MAX_GAP_FRAMES * self._history.interval)
         self._unmatched.drop_before(time - 2 * MAX_FLIGHT_POINTS * self._history.interval)
-        return tuple(contact for jump in jumps for contact in self._contact_at(jump))
+        contacts = [contact for jump in jumps for contact in self._contact_at(jump)]
+        flights = self._flights()
+        if self._drag.push(time, flights):
+            self._segments.use_drag(self._drag.drag)
+        return (*contacts, *flights)
 
-    def flush(self) -> tuple[Rebound | PairCollision, ...]:
+    def _flights(self) -> list[FreeFlight]:
+        return [
+            free_flight(
+                self._tray,
+                flight,
+                self._first_ns or 0,
+                self._history.temperature(float(flight.bend[0]), flight.species),
+            )
+            for flight in self._segments.take_flights()
+        ]
+
+    def flush(self) -> tuple[Found, ...]:
         """Give out the contacts that are held back, at the end of a recording.
 
         A contact is held back until the flight after it ends, or is 48 positions long. Here every
@@ -81,7 +109,8 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
         given out, as far as they pass the tests of `push`. Tracks that go on begin new flights.
         """
         jumps = self._segments.flush()
-        return tuple(contact for jump in jumps for contact in self._contact_at(jump))
+        contacts = [contact for jump in jumps for contact in self._contact_at(jump)]
+        return (*contacts, *self._flights())
 
     def _mass(self, jump: VelocityJump) -> float:
         return self._tray.species[jump.species].density * 4.0 / 3.0 * math.pi * jump.radius**3
@@ -147,11 +176,27 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
             tangential_error=math.hypot(incoming_error, outgoing_error),
             wall_velocity=Measured(outward * float(wall_motion[axis]), wall_error),
             place=position,
+            drag=self._segments.drag,
+            incoming_drag_time=self._drag_times(jump, crossing)[0],
+            outgoing_drag_time=self._drag_times(jump, crossing)[1],
+            friction_length=self._friction_length(jump, crossing.time),
         )
         signal = MIN_SIGNAL * math.hypot(incoming_error, wall_error)
         return (
             rebound if rebound.incoming.value > signal and rebound.outgoing.value > 0.0 else None
         )
+
+    def _drag_times(self, jump: VelocityJump, crossing: Intersection) -> tuple[float, float]:
+        """From the middle of both flights to the contact, times the drag of the bead."""
+        relative = relative_drag(self._tray, jump.species, jump.radius)
+        before, after = jump.lines[:, 0].tolist()
+        return relative * (crossing.time - before), relative * (after - crossing.time)
+
+    def _friction_length(self, jump: VelocityJump, time: float) -> float:
+        """What floor and lid take off from flight to flight, over their friction rate."""
+        temperature = self._history.temperature(time, jump.species)
+        speed = float(np.mean(np.hypot(jump.lines[:, 3], jump.lines[:, 4])))
+        return float(jump.lines[1, 0] - jump.lines[0, 0]) * temperature / speed
 
     def _is_isolated(self, crossing: Intersection, jumps: list[VelocityJump]) -> bool:
         beads = np.empty((len(jumps), 4))
@@ -189,6 +234,7 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
         timing_variance = crossing.error**2 * float(approach @ approach)
         temperatures = [self._history.temperature(crossing.time, jump.species) for jump in jumps]
         errors = np.array([_velocity_errors(jump) for jump in jumps])
+        drag_times = np.array([self._drag_times(jump, crossing) for jump in jumps])
         return PairCollision(
             stamp_ns=self._stamp_ns(crossing.time),
             tray=self._tray.number,
@@ -208,6 +254,12 @@ class ContactFinder(RestartingStage[Tracks, Rebound | PairCollision]):
             temperatures=np.array(temperatures),
             height=self._tray.dimensions[2],
             place=first - np.array(self._history.displacement(crossing.time)),
+            drag=self._segments.drag,
+            before_drag_times=drag_times[:, 0],
+            after_drag_times=drag_times[:, 1],
+            friction_length=float(
+                np.mean([self._friction_length(jump, crossing.time) for jump in jumps])
+            ),
         )
 
 

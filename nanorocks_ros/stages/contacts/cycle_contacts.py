@@ -1,4 +1,4 @@
-"""Rebounds and collisions of the current cooling cycle, summed for the restitution fit.
+"""Rebounds, collisions and flights of the current cooling cycle, for the restitution fit.
 
 Tested by ``test/stages/restitution/test_restitution_estimator.py``.
 """
@@ -9,11 +9,16 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.records import PairCollision, Rebound
+from nanorocks_ros.inference.contacts.dragged_contacts import dragged
+from nanorocks_ros.inference.flights.flight_losses import flight_table
+from nanorocks_ros.records import FreeFlight, PairCollision, Rebound
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from nanorocks_ros.settings import CoolingSettings
 
@@ -21,6 +26,9 @@ if TYPE_CHECKING:
 _MAX_WAITING = 5000
 # Error of the time of a merge, [ns]: the contact that made the body may be dated before it.
 _MERGE_ERROR_NS = 100_000_000
+# Change of the drag from which on the speeds of all contacts are corrected again, [1/s]; a smaller
+# one shifts their likelihood.
+_DRAG_STEP = 0.003
 
 
 class CycleContacts:
@@ -36,14 +44,22 @@ class CycleContacts:
     """
 
     def __init__(self, settings: CoolingSettings) -> None:
-        used = {Rebound: settings.rebounds, PairCollision: settings.collisions}
+        used = {
+            Rebound: settings.rebounds,
+            PairCollision: settings.collisions,
+            FreeFlight: settings.rebounds or settings.collisions,
+        }
         self._used = tuple(kind for kind, enabled in used.items() if enabled)
-        self._waiting: deque[Rebound | PairCollision] = deque(maxlen=_MAX_WAITING)
+        self._waiting: deque[Rebound | PairCollision | FreeFlight] = deque(maxlen=_MAX_WAITING)
+        self._flights: list[FreeFlight] = []
+        # Contacts whose speeds are in the terms, and those that wait for a drag.
         self._counted: list[Rebound | PairCollision] = []
-        self.terms = ContactTerms.of(())
+        self._new: list[Rebound | PairCollision] = []
+        self._drag = 0.0
+        self._terms = ContactTerms.of(())
 
-    def push(self, contact: Rebound | PairCollision) -> None:
-        """Add a contact; it may come before or after the speeds of that time."""
+    def push(self, contact: Rebound | PairCollision | FreeFlight) -> None:
+        """Add a contact or a flight; it may come before or after the speeds of that time."""
         if isinstance(contact, self._used):
             self._waiting.append(contact)
 
@@ -53,9 +69,8 @@ class CycleContacts:
         ripe = [contact for contact in self._waiting if contact.stamp_ns <= latest]
         self._keep(lambda stamp_ns: stamp_ns > latest)
         within = [contact for contact in ripe if contact.stamp_ns >= first_ns]
-        if within:
-            self._counted += within
-            self.terms += ContactTerms.of(within)
+        self._flights += [flight for flight in within if isinstance(flight, FreeFlight)]
+        self._new += [contact for contact in within if not isinstance(contact, FreeFlight)]
 
     def end_at_merge(self, merge_ns: int) -> None:
         """Take out the contacts since a merge, which is known seconds later.
@@ -63,16 +78,34 @@ class CycleContacts:
         Bodies rebound with the mass of all their beads, and where one turns its beads change
         their velocity without a contact.
         """
-        kept = [
-            contact for contact in self._counted if contact.stamp_ns < merge_ns - _MERGE_ERROR_NS
-        ]
-        if len(kept) < len(self._counted):
-            self._counted, self.terms = kept, ContactTerms.of(kept)
+        end_ns = merge_ns - _MERGE_ERROR_NS
+        self._flights = [flight for flight in self._flights if flight.stamp_ns < end_ns]
+        counted = self._counted + self._new
+        self._counted = []
+        self._new = [contact for contact in counted if contact.stamp_ns < end_ns]
+        self._terms = ContactTerms.of(())
 
     def next_cycle(self) -> None:
         """Clear the sums; late contacts of the cycle before are too early to be summed."""
-        self._counted = []
-        self.terms = ContactTerms.of(())
+        self._flights, self._counted, self._new = [], [], []
+        self._drag = 0.0
+        self._terms = ContactTerms.of(())
+
+    @property
+    def flights(self) -> NDArray[np.float64]:
+        """Table of the flights, see `flight_table`."""
+        return flight_table(self._flights)
+
+    def terms(self, drag: float) -> ContactTerms:
+        """Likelihoods of the contacts, with speeds for about this drag of the gas, [1/s]."""
+        if abs(drag - self._drag) > _DRAG_STEP:
+            self._counted, self._new = [], self._counted + self._new
+            self._drag, self._terms = drag, ContactTerms.of(())
+        if self._new:
+            self._terms += ContactTerms.of(dragged(contact, self._drag) for contact in self._new)
+            self._counted += self._new
+            self._new = []
+        return self._terms
 
     def restart(self, stamp_ns: int) -> None:
         """Handle time that went back to a stamp: drop the sums and all later contacts."""

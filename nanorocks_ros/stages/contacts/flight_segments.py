@@ -16,11 +16,12 @@ from nanorocks_ros.stages.contacts.residual_variance import ResidualVariance
 from nanorocks_ros.stages.contacts.segmentation_kernels import (
     JUMP_SIZE,
     FrameBeads,
-    TrackBuffer,
     append_positions,
     finish_flight,
-    reset_slot,
 )
+from nanorocks_ros.stages.contacts.track_buffer import TrackBuffer, reset_slot
+from nanorocks_ros.stages.flights.bend_fits import BEND_SIZE
+from nanorocks_ros.stages.flights.relative_drag import relative_drags
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
@@ -66,12 +67,34 @@ class VelocityJump(NamedTuple):
         return Line.from_row(self.lines[1])
 
 
+class FlightBend(NamedTuple):
+    """A free flight of a bead, with its mean acceleration.
+
+    Parameters
+    ----------
+    track, species : int
+    radius : float, [m]
+    bend : ndarray (BEND_SIZE,)
+        As `write_bend` leaves it.
+    """
+
+    track: int
+    species: int
+    radius: float
+    bend: NDArray[np.float64]
+
+
 class FlightSegments:
     """The last flights of the tracks of all round beads of a tray.
 
     Parameters
     ----------
     tray : Tray
+
+    Attributes
+    ----------
+    drag : float, [1/s]
+        Of beads of the first species: lines are fitted in the clock of a gas with that.
     """
 
     def __init__(self, tray: Tray) -> None:
@@ -93,6 +116,30 @@ class FlightSegments:
         # Tracks and species in the last frame, and the slot of each; -1 without a slot.
         self._last_tracks = b'', b''
         self._track_slots = np.empty(0, dtype=np.int64)
+        self._flights: list[FlightBend] = []
+        self._relative_drags = relative_drags(tray)
+        self._mean_radii = np.array([0.5 * kind.diameter for kind in species])
+        self.drag = 0.0
+
+    def take_flights(self) -> list[FlightBend]:
+        """The free flights that ended since the last call."""
+        flights, self._flights = self._flights, []
+        return flights
+
+    def use_drag(self, drag: float) -> None:
+        """Fit lines in the clock of a gas from now on.
+
+        Parameters
+        ----------
+        drag : float, >= 0, [1/s]
+            Of beads of the first species.
+        """
+        self.drag = drag
+        radii = self._sizes[:, 0]
+        larger = np.divide(
+            radii, self._mean_radii[self._species], out=np.ones_like(radii), where=radii > 0.0
+        )
+        self._buffer.drags[:] = drag * self._relative_drags[self._species] / larger**2
 
     def push(self, time: float, tracks: Tracks, max_gap: float) -> list[VelocityJump]:
         """Append the positions of the next frame.
@@ -111,6 +158,7 @@ class FlightSegments:
         """
         ended = self._assign_slots(tracks)
         lines = np.empty((tracks.ids.size, JUMP_SIZE))
+        bends = np.empty((tracks.ids.size, BEND_SIZE))
         rows = append_positions(
             self._buffer,
             self._residuals,
@@ -129,7 +177,10 @@ class FlightSegments:
             self._known_radii,
             self._sizes,
             lines,
+            bends,
         )
+        for k in np.flatnonzero(bends[:, 2]).tolist():
+            self._add_flight(int(tracks.ids[k]), bends[k])
         jumps = [self._velocity_jump(int(tracks.ids[k]), lines[k].copy()) for k in rows.tolist()]
         return jumps + self._finish(ended)
 
@@ -156,6 +207,7 @@ class FlightSegments:
         self._track_slots = np.array(slots, dtype=np.int64)
         used = self._track_slots >= 0
         self._species[self._track_slots[used]] = tracks.species[used]
+        self.use_drag(self.drag)
         return sorted(self._slots.keys() - set(track_ids))
 
     def _slot_of(self, track: int) -> int:
@@ -187,13 +239,21 @@ class FlightSegments:
         )
         return VelocityJump(track, species, radius, error, lines, *times_and_error)
 
+    def _add_flight(self, track: int, bend: NDArray[np.float64]) -> None:
+        species = int(self._species[self._slots[track]])
+        radius = float(self._sizes[self._slots[track], 0])
+        self._flights.append(FlightBend(track, species, radius, bend.copy()))
+
     def _finish(self, track_ids: list[int]) -> list[VelocityJump]:
         """Free the slots of tracks that ended; return their last jumps."""
         jumps = []
         for track in track_ids:
-            slot, row = self._slots[track], np.empty(JUMP_SIZE)
+            slot, row, bend = self._slots[track], np.empty(JUMP_SIZE), np.zeros(BEND_SIZE)
             variance = float(self._residuals.variances[self._species[slot]])
-            if finish_flight(self._buffer, slot, variance, float(self._sizes[slot, 0]), row):
+            radius = float(self._sizes[slot, 0])
+            if finish_flight(self._buffer, slot, variance, radius, (row, bend)):
                 jumps.append(self._velocity_jump(track, row))
+            if bend[2]:
+                self._add_flight(track, bend)
             self._free.append(self._slots.pop(track))
         return jumps

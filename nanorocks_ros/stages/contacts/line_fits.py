@@ -160,7 +160,8 @@ def rescale_errors(
     row[5] *= variance
     # The ends weigh most in a slope: one wave of the error along a flight tilts it by about this.
     row[6] = variance * row[6] + decorrelated * 4.0 * tilt * tilt
-    row[7] /= variance
+    # Errors that positions share bend a line: residuals within the stated errors are straight.
+    row[7] /= max(variance, 1.0)
 
 
 def fit_line(

@@ -18,12 +18,18 @@ from nanorocks_ros.stages.contacts.line_fits import (
     write_line,
 )
 from nanorocks_ros.stages.contacts.residual_variance import ResidualVariance, add_flight
+from nanorocks_ros.stages.contacts.track_buffer import (
+    MAX_FLIGHT_POINTS,
+    MAX_FREE_POINTS,
+    TrackBuffer,
+    append_position,
+    reset_slot,
+)
+from nanorocks_ros.stages.flights.bend_fits import undragged_times, write_bend
+from nanorocks_ros.stages.tracking.linking.track_store import ALIKE_RADII
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-MAX_FLIGHT_POINTS = 48
-"""Largest number of positions that a line is fitted to."""
 
 MIN_FLIGHT_POINTS = 4
 """Smallest number of positions of a flight on each side of a velocity jump."""
@@ -31,62 +37,19 @@ MIN_FLIGHT_POINTS = 4
 JUMP_SIZE = 2 * LINE_SIZE + 3
 """Length of the array that holds a velocity jump: two lines, `last`, `first`, `shared_error`."""
 
-_CAPACITY = 4 * MAX_FLIGHT_POINTS
 # Positions on each side of a break point: two lines through fewer would fit anything.
 _MIN_SIDE_POINTS = 2
-# Decrease of chi square that makes a break: noise reaches 30 once in about 10,000 flights.
+# Decrease of chi square that makes a break: noise reaches 30 once in about 10,000 flights. It is
+# counted in stated errors, even where residuals are smaller: errors that a bead keeps over some
+# pixels bend its trajectory without a contact.
 _MIN_GAIN = 30.0
-# Smallest residual variance, relative to the stated one. Errors that a bead keeps over some pixels
-# bend its trajectory slightly; without this limit they would cut it into pieces.
-_MIN_VARIANCE = 0.25
-# Length over which light, shadow and outline displace a bead by the same amount, in radii.
-_SHARED_LENGTH = 0.5
+# The same for the end of a free flight. Place errors that change over some pixels make many of the
+# weaker breaks: flights that end at them are those that are bent least, by drag or by chance.
+_MIN_FREE_GAIN = 150.0
+# Smallest residual variance that it is counted in, relative to the stated one.
+_MIN_FREE_VARIANCE = 0.25
 # Positions by which the best break may shift once the whole flight after it is known.
 _MAX_SHIFT = 2
-
-
-class TrackBuffer(NamedTuple):
-    """The last positions of several tracks; each track has a slot.
-
-    Parameters
-    ----------
-    times, errors : ndarray (slots, capacity), [s], [m]
-    positions : ndarray (slots, capacity, 2), [m]
-        In the camera frame.
-    ends : ndarray of int64, (slots,)
-        Number of positions.
-    flight_starts, previous_starts : ndarray of int64, (slots,)
-        Index of the first position of the current flight and of the previous one; -1 when there
-        is no previous one.
-    """
-
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    errors: NDArray[np.float64]
-    ends: NDArray[np.int64]
-    flight_starts: NDArray[np.int64]
-    previous_starts: NDArray[np.int64]
-
-    @classmethod
-    def empty(cls, slots: int) -> TrackBuffer:
-        """Allocate an empty buffer."""
-        return cls(
-            np.empty((slots, _CAPACITY)),
-            np.empty((slots, _CAPACITY, 2)),
-            np.empty((slots, _CAPACITY)),
-            *(np.zeros(slots, dtype=np.int64) for _ in range(3)),
-        )
-
-    def doubled(self) -> TrackBuffer:
-        """Return a copy with twice as many slots."""
-        return TrackBuffer(*(np.concatenate([column, np.zeros_like(column)]) for column in self))
-
-
-@compiled
-def reset_slot(buffer: TrackBuffer, slot: int) -> None:
-    """Empty a slot."""
-    buffer.ends[slot] = buffer.flight_starts[slot] = 0
-    buffer.previous_starts[slot] = -1
 
 
 class FrameBeads(NamedTuple):
@@ -112,6 +75,7 @@ def append_positions(
     known_radii: NDArray[np.float64],
     sizes: NDArray[np.float64],
     jumps: NDArray[np.float64],
+    bends: NDArray[np.float64],
 ) -> NDArray[np.int64]:
     """Append the positions of the visible beads of a frame to their tracks.
 
@@ -131,6 +95,8 @@ def append_positions(
         Written: radii and their measurement errors.
     jumps : ndarray (n, JUMP_SIZE)
         Written for each velocity jump whose flights before and after are complete now.
+    bends : ndarray (n, BEND_SIZE)
+        Written for each free flight that ended: rows without one have no positions.
 
     Returns
     -------
@@ -141,6 +107,7 @@ def append_positions(
     flight, position = np.empty(LINE_SIZE), np.empty(2)
     for k in range(slots.size):
         slot = slots[k]
+        bends[k, 2] = 0.0
         if slot < 0 or not beads.seen[k]:
             continue
         radius = known_radii[beads.species[k]]
@@ -150,10 +117,11 @@ def append_positions(
         for c in range(2):
             position[c] = beads.positions[k, c] + beads.displacement[c]
         variance = residuals.variances[beads.species[k]]
-        jumped = _end_after_gap(buffer, slot, time, max_gap, variance, radius, jumps[k])
-        _append(buffer, slot, time, position, beads.errors[k])
+        results = jumps[k], bends[k]
+        jumped = _end_after_gap(buffer, slot, time, max_gap, variance, radius, results)
+        append_position(buffer, slot, time, position, beads.errors[k])
         if not jumped:
-            jumped, ended = _split_flight(buffer, slot, variance, radius, jumps[k], flight)
+            jumped, ended = _split_flight(buffer, slot, variance, radius, results, flight)
             if ended:
                 add_flight(residuals, beads.species[k], flight)
         if jumped:
@@ -170,35 +138,44 @@ def _end_after_gap(
     max_gap: float,
     variance: float,
     radius: float,
-    jump: NDArray[np.float64],
+    results: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> bool:
     """End a track that was not seen for `max_gap`; whether its last jump was written."""
     end = buffer.ends[slot]
     if end == 0 or not time - buffer.times[slot, end - 1] > max_gap:
         return False
-    jumped = finish_flight(buffer, slot, variance, radius, jump)
+    jumped = finish_flight(buffer, slot, variance, radius, results)
     reset_slot(buffer, slot)
     return jumped
 
 
 @compiled
-def _append(
-    buffer: TrackBuffer, slot: int, time: float, position: NDArray[np.float64], error: float
-) -> None:
-    if buffer.ends[slot] == _CAPACITY:
-        _discard_oldest(buffer, slot)
-    end = buffer.ends[slot]
-    buffer.times[slot, end], buffer.errors[slot, end] = time, error
-    buffer.positions[slot, end] = position
-    buffer.ends[slot] += 1
+def finish_flight(
+    buffer: TrackBuffer,
+    slot: int,
+    variance: float,
+    radius: float,
+    results: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> bool:
+    """Write jump and bend of the last flight of a track, which ends; whether there is a jump.
+
+    `results` are arrays for the jump before the flight and for the bend of it.
+    """
+    _end_free_flight(buffer, slot, buffer.ends[slot], results[1])
+    return _write_jump(buffer, slot, buffer.ends[slot], variance, radius, results[0])
 
 
 @compiled
-def finish_flight(
-    buffer: TrackBuffer, slot: int, variance: float, radius: float, jump: NDArray[np.float64]
-) -> bool:
-    """Write the jump before the last flight of a track, which ends here; whether there is one."""
-    return _write_jump(buffer, slot, buffer.ends[slot], variance, radius, jump)
+def _end_free_flight(buffer: TrackBuffer, slot: int, end: int, bend: NDArray[np.float64]) -> None:
+    """Write the bend of the free flight up to a position, where the next one begins."""
+    first = buffer.free_starts[slot]
+    write_bend(
+        buffer.times[slot, first:end],
+        buffer.positions[slot, first:end],
+        buffer.errors[slot, first:end],
+        bend,
+    )
+    buffer.free_starts[slot] = end
 
 
 @compiled
@@ -207,7 +184,7 @@ def _split_flight(
     slot: int,
     variance: float,
     radius: float,
-    jump: NDArray[np.float64],
+    results: tuple[NDArray[np.float64], NDArray[np.float64]],
     flight: NDArray[np.float64],
 ) -> tuple[bool, bool]:
     """Cut the current flight at its best break; whether a jump was written and a flight ended."""
@@ -215,26 +192,39 @@ def _split_flight(
     offset, gain = _break_point(buffer, slot, start, end)
     # With one position after the jump, the fit would move the last one before it across.
     is_settled = start + offset + _MIN_SIDE_POINTS < end
-    if is_settled and gain > _MIN_GAIN * max(variance, _MIN_VARIANCE):
+    if is_settled and gain > _MIN_GAIN * max(variance, 1.0):
         break_row = start + offset
-        _write_line(buffer, slot, start, break_row, flight)
-        jumped = _write_jump(buffer, slot, break_row, variance, radius, jump)
+        _write_line(buffer, slot, start, break_row, buffer.times[slot, start], flight)
+        jumped = _write_jump(buffer, slot, break_row, variance, radius, results[0])
+        if gain > _MIN_FREE_GAIN * max(variance, _MIN_FREE_VARIANCE) or _is_long(
+            buffer, slot, break_row
+        ):
+            _end_free_flight(buffer, slot, break_row, results[1])
         buffer.previous_starts[slot], buffer.flight_starts[slot] = start, break_row
         return jumped, True
     if end - start <= MAX_FLIGHT_POINTS:
         return False, False
-    jumped = _write_jump(buffer, slot, end, variance, radius, jump)
+    jumped = _write_jump(buffer, slot, end, variance, radius, results[0])
     buffer.previous_starts[slot] = -1
     buffer.flight_starts[slot] += 1
+    if _is_long(buffer, slot, start + 1):
+        _end_free_flight(buffer, slot, start + 1, results[1])
     if jumped:
-        _write_line(buffer, slot, start + 1, end, flight)
+        _write_line(buffer, slot, start + 1, end, buffer.times[slot, start], flight)
     return jumped, jumped
 
 
 @compiled
+def _is_long(buffer: TrackBuffer, slot: int, end: int) -> bool:
+    """Whether the free flight has to end at a position, so that it stays in the buffer."""
+    return bool(end - buffer.free_starts[slot] >= MAX_FREE_POINTS)
+
+
+@compiled
 def _break_point(buffer: TrackBuffer, slot: int, first: int, end: int) -> tuple[int, float]:
+    times = buffer.times[slot, first:end]
     return best_break(
-        buffer.times[slot, first:end],
+        undragged_times(times, times[0], buffer.drags[slot]),
         buffer.positions[slot, first:end],
         buffer.errors[slot, first:end],
         _MIN_SIDE_POINTS,
@@ -243,10 +233,16 @@ def _break_point(buffer: TrackBuffer, slot: int, first: int, end: int) -> tuple[
 
 @compiled
 def _write_line(
-    buffer: TrackBuffer, slot: int, first: int, end: int, row: NDArray[np.float64]
+    buffer: TrackBuffer,
+    slot: int,
+    first: int,
+    end: int,
+    origin: float,
+    row: NDArray[np.float64],
 ) -> None:
+    """Fit a line to positions, in the clock of the gas without drag: its slope is at `origin`."""
     write_line(
-        buffer.times[slot, first:end],
+        undragged_times(buffer.times[slot, first:end], origin, buffer.drags[slot]),
         buffer.positions[slot, first:end],
         buffer.errors[slot, first:end],
         row,
@@ -276,25 +272,12 @@ def _write_jump(
     shared_error = (
         math.sqrt(max(1.0 - variance, 0.0)) * buffer.errors[slot, window_start:end].mean()
     )
-    _write_line(buffer, slot, window_start, first, jump[:LINE_SIZE])
-    _write_line(buffer, slot, first, end, jump[LINE_SIZE : 2 * LINE_SIZE])
+    contact = 0.5 * (buffer.times[slot, first - 1] + buffer.times[slot, first])
+    _write_line(buffer, slot, window_start, first, contact, jump[:LINE_SIZE])
+    _write_line(buffer, slot, first, end, contact, jump[LINE_SIZE : 2 * LINE_SIZE])
     for line in (jump[:LINE_SIZE], jump[LINE_SIZE : 2 * LINE_SIZE]):
-        rescale_errors(line, variance, shared_error, _SHARED_LENGTH * radius)
+        rescale_errors(line, variance, shared_error, ALIKE_RADII * radius)
     jump[2 * LINE_SIZE] = buffer.times[slot, first - 1]
     jump[2 * LINE_SIZE + 1] = buffer.times[slot, first]
     jump[2 * LINE_SIZE + 2] = shared_error
     return True
-
-
-@compiled
-def _discard_oldest(buffer: TrackBuffer, slot: int) -> None:
-    start, end = buffer.flight_starts[slot], buffer.ends[slot]
-    previous = buffer.previous_starts[slot]
-    first_kept = max(previous if previous >= 0 else start, start - MAX_FLIGHT_POINTS)
-    kept = end - first_kept
-    for k in range(kept):
-        buffer.times[slot, k] = buffer.times[slot, first_kept + k]
-        buffer.errors[slot, k] = buffer.errors[slot, first_kept + k]
-        buffer.positions[slot, k] = buffer.positions[slot, first_kept + k]
-    buffer.flight_starts[slot], buffer.ends[slot] = start - first_kept, kept
-    buffer.previous_starts[slot] = 0 if previous >= 0 else -1

@@ -65,16 +65,3 @@ def test_tables_of_rebounds_add_up():
     parts = ContactTerms.of(rebounds[:8]) + ContactTerms.of(rebounds[8:])
     whole = ContactTerms.of(rebounds)
     assert parts.wall_friction.value == pytest.approx(whole.wall_friction.value, rel=1e-9)
-
-
-def test_rubbing_walls_are_told_less_well_and_a_little_higher():
-    rebounds = sliding(np.random.default_rng(3), 60, 0.02)
-    terms = ContactTerms.of(rebounds)
-    plain = terms.wall_likelihood(1e-3).posterior((0.5, 1.0))
-    rubbed = terms.rubbed_wall_likelihood(1e-3).posterior((0.5, 1.0))
-    assert terms.wall_friction.value == pytest.approx(0.02, abs=0.01)
-    assert rubbed.mean > plain.mean
-    assert rubbed.deviation > 2.0 * plain.deviation
-    # Without losses in flight the walls are still within the interval.
-    lower, upper = rubbed.quantiles(np.array([0.025, 0.975]))
-    assert lower < plain.mean < upper
