@@ -19,8 +19,10 @@ from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.friction_weights import friction_weights
+from nanorocks_ros.inference.flights.flight_losses import flight_losses, flight_table
 from nanorocks_ros.inference.restitution_sources import intervals_of, restitution_sources
-from nanorocks_ros.records import NS, Headline
+from nanorocks_ros.records import NS, FreeFlight, Headline, Measured
 from nanorocks_ros.settings import PriorSettings
 
 if TYPE_CHECKING:
@@ -58,9 +60,13 @@ def sources_of_cycle(tray: Tray, settings: SimulationSettings, run: int) -> Rest
     noise = np.random.default_rng([settings.seed, run, 2]).standard_normal(used.size)
     speed = np.array(speeds)[used] * np.exp(_ERROR * noise)
     camera = math.hypot(_PRIOR.scale_error, library.misfit), _PRIOR.speed_bias
-    likelihood = decay_likelihood(tables, time[used], speed, _ERROR * speed, camera)
-    terms = ContactTerms.of([contact for contact in contacts if contact.stamp_ns >= _FIRST * NS])
-    return restitution_sources(tables, likelihood.integrated(), terms, _PRIOR)
+    cooling = [contact for contact in contacts if contact.stamp_ns >= _FIRST * NS]
+    flights = flight_table(contact for contact in cooling if isinstance(contact, FreeFlight))
+    losses = flight_losses(flights, Measured(_PRIOR.drag, _PRIOR.drag_error))
+    likelihood = decay_likelihood(tables, time[used], speed, _ERROR * speed, camera, losses.drag)
+    terms = ContactTerms.of(contact for contact in cooling if not isinstance(contact, FreeFlight))
+    integrated = likelihood.integrated(friction_weights(_PRIOR, terms))
+    return restitution_sources(tables, integrated, terms, _PRIOR, losses=losses)
 
 
 def report() -> None:

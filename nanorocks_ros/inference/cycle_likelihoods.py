@@ -5,7 +5,7 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+from nanorocks_ros.inference.flights.flight_losses import flight_table
 from nanorocks_ros.records import (
     UNKNOWN,
     UNKNOWN_MEASURED,
@@ -47,6 +48,8 @@ class CycleLikelihoods:
         From the closed form: restitution and error of each cycle.
     by_contacts : int
         Cycles of which only the contacts are part.
+    flights : ndarray (n, 9)
+        Table of `flight_table`: with the drag of all cycles together their contacts are read.
     """
 
     cycles: int
@@ -54,6 +57,7 @@ class CycleLikelihoods:
     contacts: ContactTerms | None = None
     by_form: tuple[tuple[float, float], ...] = ()
     by_contacts: int = 0
+    flights: NDArray[np.float64] = field(default_factory=lambda: flight_table(()))
 
     def __add__(self, other: CycleLikelihoods) -> CycleLikelihoods:
         return CycleLikelihoods(
@@ -62,38 +66,31 @@ class CycleLikelihoods:
             contacts=self.contacts + other.contacts if self.contacts and other.contacts else None,
             by_form=self.by_form + other.by_form,
             by_contacts=self.by_contacts + other.by_contacts,
+            flights=np.concatenate([self.flights, other.flights]),
         )
 
     def without_decay(self) -> CycleLikelihoods:
         """The contacts alone, with a decay that says nothing."""
         if self.decay is None:
             return self
-        nothing = {
-            field.name: np.zeros_like(getattr(self.decay, field.name))
-            for field in fields(self.decay)
-            if field.name != 'samples'
-        }
-        decay = replace(self.decay, **nothing, samples=0)
-        return replace(self, decay=decay, by_contacts=self.cycles)
+        return replace(self, decay=self.decay.emptied(), by_contacts=self.cycles)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All fields as arrays, for a file; derivatives in single precision."""
         content: dict[str, NDArray[Any]] = {
             'cycles': np.array(self.cycles),
             'by_contacts': np.array(self.by_contacts),
+            'flights': self.flights.astype(np.float32),
             'by_form': np.array(self.by_form, dtype=np.float64).reshape(-1, 2),
         }
         if self.decay is None or self.contacts is None:
             return content
-        upper = np.triu_indices(self.decay.gradient.shape[-1])
-        for prefix, part in (('decay', self.decay), ('contacts', self.contacts)):
-            for field in fields(part):
-                content[f'{prefix}.{field.name}'] = np.asarray(getattr(part, field.name))
-        # By far the largest array, and symmetric: the upper half is enough.
-        content['decay.information'] = self.decay.information[..., upper[0], upper[1]].astype(
-            np.float32
-        )
-        content['decay.gradient'] = self.decay.gradient.astype(np.float32)
+        for part in fields(self.contacts):
+            content[f'contacts.{part.name}'] = np.asarray(getattr(self.contacts, part.name))
+        content |= _decay_arrays('decay', self.decay)
+        content['frictions'] = np.array([friction for friction, _ in self.decay.rough])
+        for number, (_, decay) in enumerate(self.decay.rough):
+            content |= _decay_arrays(f'rough_{number}', decay)
         return content
 
     @classmethod
@@ -116,32 +113,56 @@ class CycleLikelihoods:
             cycles = int(arrays['cycles'])
             if 'decay.information' not in arrays:
                 return cls(cycles=cycles, by_form=by_form)
-            gradient = arrays['decay.gradient'].astype(np.float64)
-            upper = np.triu_indices(gradient.shape[-1])
-            information = np.empty((*gradient.shape, gradient.shape[-1]))
-            information[..., upper[0], upper[1]] = arrays['decay.information']
-            information[..., upper[1], upper[0]] = arrays['decay.information']
+            rough = tuple(
+                (float(friction), _decay_from(arrays, f'rough_{number}'))
+                for number, friction in enumerate(arrays['frictions'])
+            )
             return cls(
                 cycles=cycles,
-                decay=DecayLikelihood(
-                    log_likelihood=arrays['decay.log_likelihood'],
-                    gradient=gradient,
-                    information=information,
-                    deviation=arrays['decay.deviation'],
-                    samples=int(arrays['decay.samples']),
-                ),
+                decay=replace(_decay_from(arrays, 'decay'), rough=rough),
                 contacts=ContactTerms(
                     rebounds=int(arrays['contacts.rebounds']),
                     collisions=int(arrays['contacts.collisions']),
                     walls=arrays['contacts.walls'],
                     beads=arrays['contacts.beads'],
                     friction=arrays['contacts.friction'],
+                    rebound_losses=arrays['contacts.rebound_losses'],
+                    collision_losses=arrays['contacts.collision_losses'],
                 ),
+                flights=arrays['flights'],
                 by_form=by_form,
                 by_contacts=int(arrays['by_contacts']),
             )
         except (KeyError, ValueError, IndexError, TypeError) as error:
             raise FitError(where, 'holds no evidence of cycles', _NOT_THERE) from error
+
+
+def _decay_arrays(prefix: str, decay: DecayLikelihood) -> dict[str, NDArray[Any]]:
+    """Arrays of one friction; of the information, by far the largest, the upper half."""
+    upper = np.triu_indices(decay.gradient.shape[-1])
+    return {
+        f'{prefix}.log_likelihood': decay.log_likelihood,
+        f'{prefix}.gradient': decay.gradient.astype(np.float32),
+        f'{prefix}.information': decay.information[..., upper[0], upper[1]].astype(np.float32),
+        f'{prefix}.deviation': decay.deviation,
+        f'{prefix}.samples': np.array(decay.samples),
+    }
+
+
+def _decay_from(arrays: Mapping[str, NDArray[Any]], prefix: str) -> DecayLikelihood:
+    gradient = arrays[f'{prefix}.gradient'].astype(np.float64)
+    half = arrays[f'{prefix}.information']
+    upper = np.triu_indices(gradient.shape[-1])
+    information = np.empty((*gradient.shape, gradient.shape[-1]))
+    information[..., upper[0], upper[1]] = half
+    information[..., upper[1], upper[0]] = half
+    return DecayLikelihood(
+        log_likelihood=arrays[f'{prefix}.log_likelihood'],
+        gradient=gradient,
+        information=information,
+        deviation=arrays[f'{prefix}.deviation'],
+        samples=int(arrays[f'{prefix}.samples']),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,6 +184,7 @@ class MeanRestitution:
     headline : Headline
         Source of both restitutions, as of a cycle.
     wall_friction : Measured
+    drag : Measured, [1/s]
     """
 
     cycles: int
@@ -174,3 +196,4 @@ class MeanRestitution:
     by_contacts: int = 0
     headline: Headline = Headline.UNKNOWN
     wall_friction: Measured = UNKNOWN_MEASURED
+    drag: Measured = UNKNOWN_MEASURED

@@ -109,7 +109,7 @@ def check_walls(walls: tuple[float, float]) -> None:
         raise ConfigurationError(
             'prior.min_wall_restitution, prior.max_wall_restitution',
             f'{low:g} to {high:g}',
-            f'give a range within {LOWEST_WALL:g} to 1',
+            f'give a range within {LOWEST_WALL:g} to 1, for which decays were simulated',
         )
 
 

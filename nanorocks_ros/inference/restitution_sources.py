@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.inference.contacts.contact_terms import LOWEST_REBOUND
-from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
+from nanorocks_ros.inference.contacts.contact_terms import NO_SLOWING
+from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.records import (
     UNKNOWN_INTERVAL,
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
     from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+    from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.inference.likelihood_1d import Posterior1D
     from nanorocks_ros.settings import PriorSettings
 
@@ -45,6 +45,8 @@ class RestitutionSources:
         From collisions and from rebounds alone; None without any.
     wall_friction : Measured
     headline : Headline
+    drag : Measured, [1/s]
+        With friction beside it where contacts are believed alone.
     """
 
     joint: Posterior
@@ -53,6 +55,7 @@ class RestitutionSources:
     walls: Posterior1D | None
     wall_friction: Measured
     headline: Headline
+    drag: Measured
 
     def contact_intervals(self, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
         """Of beads and walls by contacts alone; unknown without contacts of the kind."""
@@ -96,6 +99,7 @@ def restitution_sources(
     prior: PriorSettings,
     *,
     decay_counts: bool = True,
+    losses: FlightLosses | None = None,
 ) -> RestitutionSources:
     """Restitutions by each source.
 
@@ -108,6 +112,9 @@ def restitution_sources(
     prior : PriorSettings
     decay_counts : bool
         False where the log likelihood holds no decay that can be trusted.
+    losses : FlightLosses, optional
+        What slows beads between contacts, where flights were seen. By friction only where contacts
+        are believed alone: that widens their intervals.
 
     Raises
     ------
@@ -115,53 +122,34 @@ def restitution_sources(
         For a wall prior outside the range of the library.
     """
     walls = prior.min_wall_restitution, prior.max_wall_restitution
-    simulated_walls = decay_walls(walls)
-    bead_likelihood = contacts.bead_likelihood(prior.collision_bias)
-    wall_likelihood = contacts.wall_likelihood(prior.rebound_bias)
+    slowing = Slowing.by_drag(losses.drag) if losses else NO_SLOWING
+    bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
+    wall_likelihood = contacts.wall_likelihood(prior.rebound_bias, slowing)
     joint = posterior_of(
         tables,
         log_likelihood,
-        simulated_walls,
+        walls,
         bead_likelihood=bead_likelihood,
         wall_likelihood=wall_likelihood,
     )
     number = contacts.rebounds + contacts.collisions
     friction = contacts.wall_friction
     headline = headline_of(number, joint.tension, friction)
-    if number and not decay_counts:
+    if not decay_counts:
         headline = Headline.CONTACTS
     if headline is Headline.CONTACTS:
-        wall_likelihood = contacts.rubbed_wall_likelihood(prior.rebound_bias)
+        slowing = losses.rubbed if losses else NO_SLOWING
+        bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
+        wall_likelihood = contacts.wall_likelihood(prior.rebound_bias, slowing)
     return RestitutionSources(
         joint=joint,
-        decay=posterior_of(tables, log_likelihood, simulated_walls) if number else joint,
+        decay=posterior_of(tables, log_likelihood, walls) if number else joint,
         beads=bead_likelihood.posterior((0.0, 1.0)) if bead_likelihood else None,
         walls=wall_likelihood.posterior(walls) if wall_likelihood else None,
         wall_friction=friction,
         headline=headline,
+        drag=slowing.drag if losses else UNKNOWN_MEASURED,
     )
-
-
-def check_wall_prior(walls: tuple[float, float]) -> None:
-    """Refuse a prior of the walls beyond rebounds, or without a decay that was simulated.
-
-    Raises
-    ------
-    ConfigurationError
-    """
-    low, high = walls
-    if not LOWEST_REBOUND <= low <= high <= 1.0 or high < LOWEST_WALL:
-        raise ConfigurationError(
-            'prior.min_wall_restitution, prior.max_wall_restitution',
-            f'{low:g} to {high:g}',
-            f'give a range within {LOWEST_REBOUND:g} to 1 that ends above {LOWEST_WALL:g}, from '
-            'which on decays were simulated',
-        )
-
-
-def decay_walls(walls: tuple[float, float]) -> tuple[float, float]:
-    """The part of a prior of the walls for which decays were simulated."""
-    return max(walls[0], LOWEST_WALL), walls[1]
 
 
 def intervals_of(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:

@@ -20,6 +20,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
     parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
     parser.add_argument('--nodes', type=int, default=800, help='simulated points; default 800')
+    parser.add_argument(
+        '--rough-nodes',
+        type=int,
+        default=600,
+        help='simulated points of beads that rub along walls and each other; default 600, 0: none',
+    )
     parser.add_argument('--runs', type=int, default=12, help='runs at each point; default 12')
     parser.add_argument('--seed', type=int, default=1, help='random seed; default 1')
     parser.add_argument(
@@ -51,6 +57,7 @@ def run(options: argparse.Namespace) -> int:
     plan = LibraryPlan(
         tray=tray_by_number(load_trays(options.trays_file or None), options.tray),
         nodes=options.nodes,
+        rough_nodes=options.rough_nodes,
         runs=options.runs,
         seed=options.seed,
         drag=options.drag,

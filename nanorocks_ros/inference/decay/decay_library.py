@@ -10,7 +10,8 @@ ln f is written as -ln(1 + rate x), which Haff's law would be, plus polynomials,
 times 1 / (1 + rate x), at each of a series of distances x; rate is a rough one, linear in the
 energies lost, 1 - restitution^2. The polynomials are in the loss of a pair, the loss at a side
 wall and the *root* of the loss at floor and lid: in a flat tray these empty the vertical motion
-first, so that near zero loss the rate rises steeply.
+first, so that near zero loss the rate rises steeply. A library may hold what friction adds, see
+`friction_terms`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from nanorocks_ros.inference.decay.friction_terms import friction_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,8 +38,8 @@ NUISANCES = ('height', 'diameter', 'anisotropy', 'count', 'start')
 UNITS = np.array([0.25e-3, 0.02, 0.7, 1.0, 1.0])
 # Nuisances with a quadratic term as well, without which their mean effect would be missing.
 _CURVED = (0, 2)
-# Lowest wall restitution of a library.
-LOWEST_WALL = 0.78
+# Lowest restitution of the side walls, and of floor and lid, of nodes of a library.
+LOWEST_WALL, LOWEST_FLOOR_LID = 0.5, 0.3
 _DEGREE, _WEIGHTED_DEGREE, _NUISANCE_DEGREE = 4, 3, 2
 
 
@@ -61,6 +64,15 @@ class DecayLibrary:
         Grid of the covariance; falling from 1, rising to 1.
     covariance : ndarray (n_c, n_w, n_x, n_x)
         Of ln f between runs.
+    lowest : ndarray (2,)
+        Lowest restitutions that were simulated, of side walls, of floor and lid. Lower ones count
+        as these.
+    rubbing : float, [1/m]
+        Rough rate of decay with a friction of 1.
+    friction_coefficients : ndarray (n_friction_terms, n_x)
+        Empty if only smooth beads were simulated.
+    friction_misfit : float
+        Error of the functions in ln f with friction, over the friction of the walls.
     """
 
     tray: str
@@ -72,11 +84,20 @@ class DecayLibrary:
     covariance_restitution: NDArray[np.float64]
     covariance_wall: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    lowest: NDArray[np.float64]
+    rubbing: float
+    friction_coefficients: NDArray[np.float64]
+    friction_misfit: float
 
     @cached_property
     def step(self) -> float:
         """Step of the logarithm of the distances."""
         return float(np.log(self.distances[-1] / self.distances[0]) / (self.distances.size - 1))
+
+    @property
+    def rough(self) -> bool:
+        """Whether rough beads were simulated."""
+        return len(self.friction_coefficients) > 0
 
     def log_speed(
         self,
@@ -84,6 +105,7 @@ class DecayLibrary:
         wall_restitution: NDArray[np.float64],
         floor_lid_restitution: NDArray[np.float64] | None = None,
         nuisances: NDArray[np.float64] | None = None,
+        friction: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
         """Mean of ln f at the distances.
 
@@ -94,15 +116,18 @@ class DecayLibrary:
             That of the side walls if not given.
         nuisances : ndarray (n, 5), optional
             Deviations from the listed tray, in SI units; see `NUISANCES`.
+        friction : ndarray (n, 3), optional
+            See `FRICTION`; smooth beads if not given. Of a library that is `rough`.
 
         Returns
         -------
         ndarray (n, n_x)
         """
+        ends = wall_restitution if floor_lid_restitution is None else floor_lid_restitution
         design = design_of(
             restitution,
-            wall_restitution,
-            wall_restitution if floor_lid_restitution is None else floor_lid_restitution,
+            np.maximum(wall_restitution, self.lowest[0]),
+            np.maximum(ends, self.lowest[1]),
             np.zeros((np.size(restitution), len(NUISANCES))) if nuisances is None else nuisances,
         )
         rate = design.losses @ self.base
@@ -110,6 +135,12 @@ class DecayLibrary:
         for k, distance in enumerate(self.distances):
             log_speed[:, k] = design.terms(rate * distance) @ self.coefficients[:, k]
             log_speed[:, k] -= np.log1p(rate * distance)
+        if friction is not None:
+            terms = friction_terms(design.losses, design.nuisances, friction)
+            rubbing = self.rubbing * friction[:, 0]
+            for k, distance in enumerate(self.distances):
+                offset, matrix = rough_design(terms, rate * distance, rubbing * distance)
+                log_speed[:, k] += offset + matrix @ self.friction_coefficients[:, k]
         return log_speed
 
 
@@ -121,11 +152,14 @@ class Design:
     ----------
     losses : ndarray (n, 3)
         1 - restitution^2 of pairs, side walls, floor and lid.
+    nuisances : ndarray (n, 5)
+        In `UNITS`.
     plain, weighted : ndarray (n, n_terms)
         Terms without and with the factor 1 / (1 + rate x).
     """
 
     losses: NDArray[np.float64]
+    nuisances: NDArray[np.float64]
     plain: NDArray[np.float64]
     weighted: NDArray[np.float64]
 
@@ -161,9 +195,31 @@ def design_of(
     products += [factor * scaled[:, number] ** 2 for number in _CURVED for factor in simple]
     return Design(
         losses=losses,
+        nuisances=scaled,
         plain=np.column_stack(main + products),
         weighted=np.column_stack(weighted + products),
     )
+
+
+def rough_design(
+    terms: NDArray[np.float64], decay: NDArray[np.float64], rubbing: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What friction adds to ln f at one distance: an offset, and the terms with coefficients.
+
+    Parameters
+    ----------
+    terms : ndarray (n, n_terms)
+        From `friction_terms`.
+    decay, rubbing : ndarray (n,)
+        Rates of decay by restitutions and by friction, times the distance.
+
+    Returns
+    -------
+    offset : ndarray (n,)
+    matrix : ndarray (n, 2 n_terms)
+    """
+    weight = 1.0 / (1.0 + decay + rubbing)
+    return -np.log1p(rubbing / (1.0 + decay)), np.hstack((terms, weight[:, np.newaxis] * terms))
 
 
 def _powers(degree: int) -> list[tuple[int, int, int]]:

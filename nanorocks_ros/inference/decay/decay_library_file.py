@@ -14,7 +14,13 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.calibration_archives import load_archive
-from nanorocks_ros.inference.decay.decay_library import DecayLibrary, term_count, tray_key
+from nanorocks_ros.inference.decay.decay_library import (
+    NUISANCES,
+    DecayLibrary,
+    term_count,
+    tray_key,
+)
+from nanorocks_ros.inference.decay.friction_terms import friction_term_count
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,14 +31,16 @@ if TYPE_CHECKING:
 
 _ARRAYS = (
     'base',
-    'misfit',
     'distances',
     'coefficients',
     'covariance_restitution',
     'covariance_wall',
-    'covariance',
+    'lowest',
+    'friction_coefficients',
 )
-_FORMAT = 1
+_NUMBERS = ('misfit', 'rubbing', 'friction_misfit')
+_COVARIANCE = 'covariance'
+_FORMAT = 2
 
 
 def build_command(tray: Tray) -> str:
@@ -98,21 +106,37 @@ def load_library(name: str, *, packaged: bool) -> DecayLibrary:
 
 
 def _library(arrays: Mapping[str, NDArray[Any]]) -> DecayLibrary:
-    if int(arrays['format']) != _FORMAT or len(arrays['coefficients']) != term_count():
+    if int(arrays['format']) != _FORMAT or not _has_these_terms(arrays):
         raise ValueError('of another release')
+    half = arrays[_COVARIANCE]
+    n_x = arrays['distances'].size
+    upper = np.triu_indices(n_x)
+    covariance = np.empty((*half.shape[:-1], n_x, n_x))
+    covariance[..., upper[0], upper[1]] = half
+    covariance[..., upper[1], upper[0]] = half
     return DecayLibrary(
         tray=str(arrays['tray']),
         made_by=str(arrays['made_by']),
         misfit=float(arrays['misfit']),
-        **{name: arrays[name].astype(np.float64) for name in _ARRAYS if name != 'misfit'},
+        rubbing=float(arrays['rubbing']),
+        friction_misfit=float(arrays['friction_misfit']),
+        covariance=covariance,
+        **{name: arrays[name].astype(np.float64) for name in _ARRAYS},
+    )
+
+
+def _has_these_terms(arrays: Mapping[str, NDArray[Any]]) -> bool:
+    return len(arrays['coefficients']) == term_count() and (
+        len(arrays['friction_coefficients']) in (0, friction_term_count(len(NUISANCES)))
     )
 
 
 def library_arrays(library: DecayLibrary) -> dict[str, NDArray[Any]]:
-    """Arrays of the file of a library."""
+    """Arrays of the file of a library; of the covariances the upper half, in single precision."""
+    upper = np.triu_indices(library.distances.size)
     return {
-        **{name: np.asarray(getattr(library, name)) for name in _ARRAYS},
-        'covariance': library.covariance.astype(np.float32),
+        **{name: np.asarray(getattr(library, name)) for name in _NUMBERS + _ARRAYS},
+        _COVARIANCE: library.covariance[..., upper[0], upper[1]].astype(np.float32),
         'format': np.array(_FORMAT),
         'tray': np.array(library.tray),
         'made_by': np.array(library.made_by),

@@ -13,19 +13,21 @@ unlike noise, do not average out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from nanorocks_ros.inference.decay.likelihood_kernels import ROUNDING, evaluate
 from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.numerics.small_cholesky import integrate
+from nanorocks_ros.records import Measured
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+    from nanorocks_ros.inference.decay.friction_weights import FrictionWeights
 
 # Smallest relative error of a speed.
 _LEAST_ERROR = 2e-3
@@ -36,8 +38,35 @@ _EVERY = 4
 _WIDE = 0.1
 _SCALES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 # Nuisances of the camera, beside those of the library: scale of lengths, and a relative error of
-# the speeds that grows with their logarithm.
+# the speeds that grows with their logarithm. The error of the drag is one more.
 CAMERA_NUISANCES = ('scale', 'speed_bias')
+_NO_DRAG = Measured(0.0, 0.0)
+
+
+class _Unknowns(NamedTuple):
+    """Standard deviations of the `CAMERA_NUISANCES`; drag and its error, [1/s]."""
+
+    scale: float
+    speed_bias: float
+    drag: float
+    drag_error: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoughTables:
+    """A library of beads that rub on the same grid.
+
+    Parameters
+    ----------
+    friction : float
+        Of floor, lid and side walls.
+    mean, slopes
+        As of `DecayTables`, with one more nuisance, the friction of the beads.
+    """
+
+    friction: float
+    mean: NDArray[np.float64]
+    slopes: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +86,8 @@ class DecayTables:
         Corners around each point, in the grid of the covariances.
     shares : ndarray (n_c * n_w, 4)
         Their weights.
+    rough : tuple of RoughTables
+        With rising friction; empty if the library knows smooth beads alone.
     """
 
     decays: DecayLibrary
@@ -66,6 +97,7 @@ class DecayTables:
     slopes: NDArray[np.float64]
     corners: NDArray[np.int64]
     shares: NDArray[np.float64]
+    rough: tuple[RoughTables, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +119,8 @@ class DecayLikelihood:
         Sum of the squares of the whitened residuals.
     samples : int
         Number of bins, whatever the number of speeds in each.
+    rough : tuple of (float, DecayLikelihood)
+        The same with rising frictions.
     """
 
     log_likelihood: NDArray[np.float64]
@@ -94,6 +128,7 @@ class DecayLikelihood:
     information: NDArray[np.float64]
     deviation: NDArray[np.float64]
     samples: int
+    rough: tuple[tuple[float, DecayLikelihood], ...] = ()
 
     def __add__(self, other: DecayLikelihood) -> DecayLikelihood:
         return DecayLikelihood(
@@ -102,10 +137,39 @@ class DecayLikelihood:
             information=self.information + other.information,
             deviation=self.deviation + other.deviation,
             samples=self.samples + other.samples,
+            rough=tuple(
+                (friction, own + others)
+                for (friction, own), (_, others) in zip(self.rough, other.rough, strict=True)
+            ),
         )
 
-    def integrated(self) -> NDArray[np.float64]:
-        """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors."""
+    def emptied(self) -> DecayLikelihood:
+        """A likelihood of the same shape that says nothing."""
+        return DecayLikelihood(
+            log_likelihood=np.zeros_like(self.log_likelihood),
+            gradient=np.zeros_like(self.gradient),
+            information=np.zeros_like(self.information),
+            deviation=np.zeros_like(self.deviation),
+            samples=0,
+            rough=tuple((friction, likelihood.emptied()) for friction, likelihood in self.rough),
+        )
+
+    def integrated(self, friction: FrictionWeights | None = None) -> NDArray[np.float64]:
+        """Log likelihood (n_places,) with the nuisances integrated over their Gaussian priors.
+
+        Parameters
+        ----------
+        friction : FrictionWeights, optional
+            Probability of frictions; smooth beads if not given, or not in the library.
+        """
+        smooth = self._integrated()
+        if friction is None or not self.rough:
+            return smooth
+        nodes = np.array([0.0, *(value for value, _ in self.rough)])
+        logs = np.stack([smooth, *(likelihood._integrated() for _, likelihood in self.rough)])
+        return friction.mixed(nodes, logs)
+
+    def _integrated(self) -> NDArray[np.float64]:
         log_likelihood = np.empty(self.log_likelihood.shape)
         n_z = self.gradient.shape[-1]
         integrate(
@@ -131,8 +195,13 @@ def decay_likelihood(
     speed: NDArray[np.float64],
     error: NDArray[np.float64],
     camera: tuple[float, float],
+    drag: Measured = _NO_DRAG,
+    highest_friction: float = math.inf,
 ) -> DecayLikelihood:
     """The likelihood of one decay over the grid.
+
+    In a gas that slows beads, v(t) = exp(-drag t) w(s) with s = (1 - exp(-drag t)) / drag, where
+    w is the decay in a vacuum: both are compared in the clock s.
 
     Parameters
     ----------
@@ -144,8 +213,14 @@ def decay_likelihood(
         Mean projected speeds and one standard error of each.
     camera : tuple of 2 floats
         Standard deviations of the `CAMERA_NUISANCES`, relative.
+    drag : Measured, optional, [1/s]
+        Of the gas on the beads, with its error.
+    highest_friction : float
+        Decays are compared at frictions up to the next one above it, which saves time; at 0 as
+        those of smooth beads alone.
     """
     library = tables.decays
+    time, speed, error = undragged(time, speed, error, drag.value)
     within = time < time[0] * math.exp((library.distances.size - 2) * library.step)
     cells, log_time, log_speed, variance = _binned(
         library.step, time[within], speed[within], error[within]
@@ -155,36 +230,74 @@ def decay_likelihood(
     # strength of the fluctuations is known too roughly to determine restitutions.
     subset = slice(None, None, _EVERY)
     corners, shares = tables.corners[subset], tables.shares[subset]
-    rough = _over(tables, data, cells, camera, (subset, corners, shares), derivatives=False)
-    best = int(np.argmax(rough.log_likelihood)) * _EVERY
+    unknowns = _Unknowns(*camera, drag.value, drag.error)
+    first = _over(tables, data, cells, unknowns, (subset, corners, shares), derivatives=False)
+    best = int(np.argmax(first.log_likelihood)) * _EVERY
     all_places = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
-    scale, bias = camera
-    if scale <= _WIDE:
-        return _over(tables, data, cells, camera, all_places)
+    smooth = _scaled(tables, data, cells, unknowns, all_places)
+    rough = []
+    below = sum(rubbing.friction < highest_friction for rubbing in tables.rough)
+    for rubbing in tables.rough[: below + 1] if highest_friction > 0.0 else ():
+        own = replace(tables, mean=rubbing.mean, slopes=rubbing.slopes)
+        # The misfit with friction acts as an error of the scale, as that without.
+        scale = math.hypot(unknowns.scale, library.friction_misfit * rubbing.friction)
+        likelihood = _scaled(own, data, cells, unknowns._replace(scale=scale), all_places)
+        rough.append((rubbing.friction, likelihood))
+    return replace(smooth, rough=tuple(rough))
+
+
+def _scaled(
+    tables: DecayTables,
+    data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    cells: NDArray[np.int64],
+    unknowns: _Unknowns,
+    places: tuple[slice, NDArray[np.int64], NDArray[np.float64]],
+) -> DecayLikelihood:
+    """Likelihood at all points, for several scales if the error of the scale is large."""
+    log_time, log_speed, variance = data
+    if unknowns.scale <= _WIDE:
+        return _over(tables, data, cells, unknowns, places)
     likelihoods = [
         _over(
             tables,
-            (log_time, log_speed - step * scale, variance),
+            (log_time, log_speed - step * unknowns.scale, variance),
             cells,
-            (0.5 * scale, bias),
-            all_places,
+            unknowns._replace(scale=0.5 * unknowns.scale),
+            places,
         )
         for step in _SCALES
     ]
+
+    def stacked(name: str) -> NDArray[np.float64]:
+        return np.stack([getattr(likelihood, name) for likelihood in likelihoods])
+
     return DecayLikelihood(
-        **{
-            name: np.stack([getattr(likelihood, name) for likelihood in likelihoods])
-            for name in ('log_likelihood', 'gradient', 'information', 'deviation')
-        },
+        log_likelihood=stacked('log_likelihood'),
+        gradient=stacked('gradient'),
+        information=stacked('information'),
+        deviation=stacked('deviation'),
         samples=cells.size,
     )
+
+
+def undragged(
+    time: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    error: NDArray[np.float64],
+    drag: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Times, speeds and errors in the clock of the gas without drag; the speeds of time 0 stay."""
+    if drag == 0.0:
+        return time, speed, error
+    growth = np.exp(drag * time)
+    return -np.expm1(-drag * time) / drag, growth * speed, growth * error
 
 
 def _over(
     tables: DecayTables,
     data: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     cells: NDArray[np.int64],
-    camera: tuple[float, float],
+    unknowns: _Unknowns,
     places: tuple[slice, NDArray[np.int64], NDArray[np.float64]],
     *,
     derivatives: bool = True,
@@ -193,7 +306,7 @@ def _over(
     library = tables.decays
     subset, corners, shares = places
     mean = tables.mean[subset]
-    n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES)
+    n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES) + 1
     numbers = np.empty((len(mean), 2))
     gradient = np.empty((len(mean) if derivatives else 0, n_z))
     information = np.empty((len(gradient), n_z, n_z))
@@ -205,7 +318,7 @@ def _over(
         np.ascontiguousarray(shares),
         np.ascontiguousarray(mean),
         np.ascontiguousarray(tables.slopes[subset]),
-        np.array(camera),
+        np.array(unknowns),
         math.log(library.distances[0]),
         library.step,
         (numbers, gradient, information),

@@ -12,8 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import savgol_filter
 
-from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL, NUISANCES, UNITS, count_step
-from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+from nanorocks_ros.inference.decay.decay_library import (
+    LOWEST_WALL,
+    NUISANCES,
+    UNITS,
+    count_step,
+)
+from nanorocks_ros.inference.decay.decay_likelihood import DecayTables, RoughTables
+from nanorocks_ros.inference.decay.friction_terms import FRICTION
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +30,10 @@ if TYPE_CHECKING:
 
 # Nodes of the grid along each restitution, denser towards 1: evenly spaced in these powers of
 # 1 - restitution, in which likelihoods are smooth.
-_BEAD_NODES, _WALL_NODES = 35, 15
+_BEAD_NODES, _WALL_NODES = 35, 20
 BEAD_POWER, WALL_POWER = 1.0 / 1.5, 0.5
+# Frictions at which decays are compared, beside 0.
+FRICTIONS = (0.004, 0.012, 0.035, 0.1)
 # Cells of ln t over which curves of the library are smoothed.
 _SMOOTH_CELLS = 9
 
@@ -44,7 +52,7 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
     restitution = 1.0 - np.linspace(1.0, 0.0, _BEAD_NODES) ** (1.0 / BEAD_POWER)
     wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_NODES) ** (1.0 / WALL_POWER)
     beads, walls = (axis.ravel() for axis in np.meshgrid(restitution, wall, indexing='ij'))
-    mean = _smooth(library.log_speed(beads, walls))
+    mean = library.log_speed(beads, walls)
     slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
     for number, spread in enumerate(_spreads(tray, settings)):
         change = np.zeros((beads.size, len(NUISANCES)))
@@ -52,16 +60,47 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         high = library.log_speed(beads, walls, None, change)
         low = library.log_speed(beads, walls, None, -change)
         slopes.append(0.5 * (high - low) * spread / UNITS[number])
+    smooth_slopes = np.stack(slopes, axis=1)
     corners, shares = _corners(library, beads, walls)
+    rough = [
+        _rubbing(library, beads, walls, friction, settings.bead_friction_spread)
+        for friction in (FRICTIONS if library.rough else ())
+    ]
     return DecayTables(
         decays=library,
         restitution=restitution,
         wall_restitution=wall,
-        mean=mean,
-        slopes=_smooth(np.stack(slopes, axis=1)),
+        mean=_smooth(mean),
+        slopes=_smooth(smooth_slopes),
         corners=corners,
         shares=shares,
+        rough=tuple(
+            RoughTables(
+                friction=friction,
+                mean=_smooth(rubbed),
+                slopes=_smooth(np.concatenate((smooth_slopes, by_beads), axis=1)),
+            )
+            for friction, (rubbed, by_beads) in zip(FRICTIONS, rough, strict=False)
+        ),
     )
+
+
+def _rubbing(
+    library: DecayLibrary,
+    beads: NDArray[np.float64],
+    walls: NDArray[np.float64],
+    friction: float,
+    spread: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean ln f with a friction of walls and beads, and its change with that of beads alone."""
+
+    def log_speed(beads_over_walls: float) -> NDArray[np.float64]:
+        point = np.zeros((beads.size, len(FRICTION)))
+        point[:, 0], point[:, 1] = friction, beads_over_walls
+        return library.log_speed(beads, walls, None, None, point)
+
+    change = 0.5 * (log_speed(spread) - log_speed(-spread))
+    return log_speed(0.0), change[:, np.newaxis]
 
 
 def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -96,7 +135,7 @@ def _floor_and_lid(
     if spread == 0.0:
         return np.zeros((beads.size, library.distances.size))
     more, less = (1.0 - (1.0 - walls) * math.exp(logarithm) for logarithm in (spread, -spread))
-    high = library.log_speed(beads, walls, np.maximum(more, LOWEST_WALL - 0.05))
+    high = library.log_speed(beads, walls, more)
     return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
 
 

@@ -26,6 +26,9 @@ _AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
 _EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
 # The search starts from the amplitude that matches the first speeds; largest ln of it over them.
 _MOST_LEAD = 8.0
+# Drag times the time in the clock without it: below the first it is negligible, and at 1 the gas
+# has come to rest.
+_NEARLY_STRAIGHT, _MOST_DRAGGED = 1e-4, 1.0 - 1e-9
 # Number of speeds for the initial amplitude.
 _FIRST_SPEEDS = 3
 
@@ -56,17 +59,18 @@ def evaluate(
     corners, shares : ndarray (n_places or 1, 4)
         One for all points, or one for each.
     means, slopes : ndarray (n_places, n_x), (n_places, n_z, n_x)
-    camera : ndarray (2,)
+    camera : ndarray (4,)
+        Standard deviations of scale and bias; drag and its standard deviation, [1/s].
     first, step : float
         Logarithm of the first distance of the library, and its step.
     results : tuple of 3 ndarrays
-        Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 2), and
-        information, (n_places, n_z + 2, n_z + 2): empty if not needed.
+        Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 3), and
+        information, (n_places, n_z + 3, n_z + 3): empty if not needed.
     """
     log_time, log_speed, variance = data
     numbers, gradients, informations = results
     n = log_time.size
-    n_z = slopes.shape[1] + camera.size
+    n_z = slopes.shape[1] + 3
     mixed = np.empty(covariances.shape[1:])
     factor = np.empty((n, n))
     # Columns: residual, derivative with ln a, then the nuisances; whitened in place.
@@ -100,13 +104,39 @@ def evaluate(
         _compare(log_time, log_speed, means[place], first, step, best, columns)
         offset = (best - first) / step
         _look_up(slopes[place], log_time / step + offset, columns[2:])
-        columns[n_z] = camera[0] * (columns[1] - 1.0)
-        columns[n_z + 1] = camera[1] * (log_speed - middle)
+        columns[n_z - 1] = camera[0] * (columns[1] - 1.0)
+        columns[n_z] = camera[1] * (log_speed - middle)
+        _drag_column(log_time, camera[2], camera[3], columns[1], columns[n_z + 1])
         whiten(factor, columns, 2 + n_z)
         _sum_up(
             columns, (deviation, spread), numbers[place], gradients[place], informations[place]
         )
         numbers[place, 0] -= 0.5 * (log_determinant + deviation * deviation)
+
+
+@kernel
+def _drag_column(
+    log_time: NDArray[np.float64],
+    drag: float,
+    error: float,
+    slope: NDArray[np.float64],
+    column: NDArray[np.float64],
+) -> None:
+    """Change of the expected ln w at a time s, for one standard deviation of the drag.
+
+    With x = drag s, ln(w) changes by t = -ln(1 - x) / drag for each unit of the drag, and ln(s) by
+    (t (1 - x) - s) / (drag s), from which the slope of the mean makes another change of ln(w).
+    """
+    for i in range(log_time.size):
+        s = math.exp(log_time[i])
+        x = min(drag * s, _MOST_DRAGGED)
+        if abs(x) < _NEARLY_STRAIGHT:
+            # The first terms of both series.
+            time, later = s * (1.0 + 0.5 * x), -s * (0.5 + x / 6.0)
+        else:
+            time = -math.log1p(-x) / drag
+            later = (time * (1.0 - x) - s) / x
+        column[i] = error * ((slope[i] - 1.0) * later - time)
 
 
 @kernel

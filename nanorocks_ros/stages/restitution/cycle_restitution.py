@@ -11,9 +11,11 @@ from nanorocks_ros.records import (
     UNKNOWN,
     UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
+    UNKNOWN_MEASURED_INTERVAL,
     Headline,
     Interval,
     Measured,
+    MeasuredInterval,
 )
 
 UNDETERMINED = Interval(lower=0.0, upper=1.0)
@@ -40,6 +42,10 @@ class CycleRestitution:
     decay_restitution, decay_wall_restitution : Interval
     contact_restitution, contact_wall_restitution : Interval
     wall_friction : Measured
+    drag : Measured
+    acceleration : MeasuredInterval
+    accelerated : bool
+        Whether that is far from 0 and changes the speeds, so that the decay does not count.
     """
 
     determined: bool = False
@@ -63,3 +69,6 @@ class CycleRestitution:
     contact_restitution: Interval = UNKNOWN_INTERVAL
     contact_wall_restitution: Interval = UNKNOWN_INTERVAL
     wall_friction: Measured = UNKNOWN_MEASURED
+    drag: Measured = UNKNOWN_MEASURED
+    acceleration: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
+    accelerated: bool = False

@@ -13,6 +13,7 @@ from nanorocks_ros.records import (
     NS,
     CorEstimate,
     CorStatus,
+    FreeFlight,
     Measured,
     Merge,
     PairCollision,
@@ -47,7 +48,7 @@ _STAMP_ROUNDING_NS = 1_000_000
 _LATE_NS = 500_000_000
 
 
-Input = SpeedEstimate | Rebound | PairCollision | Merge
+Input = SpeedEstimate | Rebound | PairCollision | FreeFlight | Merge
 
 
 class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
@@ -238,6 +239,8 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             initial_speeds, haff_times = species_decays(self._tray, decay.time, samples, few)
         if result.tension > LARGEST_TENSION:
             quality |= Quality.INCONSISTENT
+        if result.accelerated:
+            quality |= Quality.ACCELERATED
         return (
             CorEstimate(
                 stamp_ns=last.stamp_ns,
@@ -272,6 +275,8 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
                 contact_restitution=result.contact_restitution,
                 contact_wall_restitution=result.contact_wall_restitution,
                 wall_friction=result.wall_friction,
+                drag=result.drag,
+                acceleration=result.acceleration,
             ),
         )
 
@@ -294,7 +299,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
             return CorStatus.UNDETERMINED, CycleRestitution()
         final = status is CorStatus.FINAL
         try:
-            result = self._method.estimate(decay, self._contacts.terms, final=final)
+            result = self._method.estimate(decay, self._contacts, final=final)
         except FitError:
             # The restitution is published as unknown.
             return CorStatus.NO_DECAY, CycleRestitution()

@@ -18,10 +18,12 @@ from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRest
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.friction_weights import friction_weights
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.inference.flights.flight_losses import flight_losses
+from nanorocks_ros.inference.posterior import check_walls
 from nanorocks_ros.inference.restitution_sources import (
     RestitutionSources,
-    check_wall_prior,
     intervals_of,
     restitution_sources,
 )
@@ -34,6 +36,7 @@ from nanorocks_ros.records import (
     Measured,
     MeasuredInterval,
 )
+from nanorocks_ros.stages.flights.relative_drag import mean_relative_drag
 from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
 
 if TYPE_CHECKING:
@@ -41,11 +44,14 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-    from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+    from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.settings import PipelineSettings
 
 # Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
 _LARGEST_DEVIATION = 0.2
+# Largest work of an acceleration on a bead that crosses the tray, over its mean square speed, with
+# which a decay still counts: speeds then change by a tenth.
+_MAX_WORK = 0.1
 LARGEST_TENSION = 3.0
 """Standard deviations by which decay, rebounds and collisions may disagree without a flag."""
 
@@ -69,13 +75,24 @@ class Decay:
     of_grains: bool = False
 
 
+class Contacts(Protocol):
+    """Contacts and flights of a cycle, as `CycleContacts` sums them."""
+
+    @property
+    def flights(self) -> NDArray[np.float64]:
+        """Table of the flights."""
+
+    def terms(self, drag: float) -> ContactTerms:
+        """Likelihoods of the contacts in a gas with about this drag, [1/s]."""
+
+
 class RestitutionMethod(Protocol):
     """A method that turns decays into restitutions; it keeps the evidence of finished cycles."""
 
     relation: CorRelation
     evidence: CycleLikelihoods | None
 
-    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> CycleRestitution:
+    def estimate(self, decay: Decay, contacts: Contacts, *, final: bool) -> CycleRestitution:
         """Restitution of a cycle; raises FitError where there is no decay."""
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
@@ -98,7 +115,7 @@ class PaperMethod:
         self._tray = tray
         self.evidence: CycleLikelihoods | None = None
 
-    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> CycleRestitution:
+    def estimate(self, decay: Decay, contacts: Contacts, *, final: bool) -> CycleRestitution:
         """Restitution of a cycle; the method of the paper does not use contacts.
 
         Raises
@@ -176,14 +193,17 @@ class DecayLibraryMethod:
             True: (math.hypot(scale, prior.grain_scale_error), prior.grain_speed_bias),
         }
         self._prior = prior
-        check_wall_prior((prior.min_wall_restitution, prior.max_wall_restitution))
+        self._drag_prior = Measured(prior.drag, prior.drag_error)
+        self._relative_drag = mean_relative_drag(tray)
+        check_walls((prior.min_wall_restitution, prior.max_wall_restitution))
         half = 0.5 * settings.cooling.probability
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
+        self._probability = settings.cooling.probability
         self._include_inconsistent = settings.cooling.include_inconsistent
         self.evidence: CycleLikelihoods | None = None
         self._means_so_far = UNKNOWN_MEASURED, UNKNOWN_MEASURED
 
-    def estimate(self, decay: Decay, contacts: ContactTerms, *, final: bool) -> CycleRestitution:
+    def estimate(self, decay: Decay, contacts: Contacts, *, final: bool) -> CycleRestitution:
         """Restitution of a cycle.
 
         Raises
@@ -193,17 +213,30 @@ class DecayLibraryMethod:
         """
         if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
+        losses = flight_losses(contacts.flights, self._drag_prior)
+        terms = contacts.terms(losses.drag.value)
+        friction = friction_weights(self._prior, terms)
         likelihood = decay_likelihood(
-            self._tables, decay.time, decay.speed, decay.error, self._camera[decay.of_grains]
+            self._tables,
+            decay.time,
+            decay.speed,
+            decay.error,
+            self._camera[decay.of_grains],
+            self._drag_of_gas(losses.drag),
+            math.inf if final else friction.highest if friction else 0.0,
         )
-        integrated = likelihood.integrated()
-        sources = self._sources(integrated, contacts)
+        integrated = likelihood.integrated(friction)
+        accelerated = losses.is_accelerated and self._drives(losses, decay)
+        sources = self._sources(integrated, terms, losses, decays=0 if accelerated else 1)
         best = int(np.argmax(integrated))
         result = replace(
             self._speeds(decay, final=final),
             **_by_source(sources, self._ends),
-            rebounds=contacts.rebounds,
-            collisions=contacts.collisions,
+            rebounds=terms.rebounds,
+            collisions=terms.collisions,
+            drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
+            acceleration=losses.magnitude(self._probability),
+            accelerated=accelerated,
             reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         )
         restitution, wall_restitution = sources.intervals(self._ends)
@@ -219,18 +252,35 @@ class DecayLibraryMethod:
             # Rebounds determine the walls even where nothing is known of the beads.
             result = replace(result, wall_restitution=wall_restitution)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
-        mean, wall_mean = self._means(likelihood, contacts, final=final, trusted=trusted)
+        own = CycleLikelihoods(
+            cycles=1, decay=likelihood, contacts=terms, flights=contacts.flights
+        )
+        mean, wall_mean = self._means(own, final=final, trusted=trusted and not accelerated)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
 
+    def _drag_of_gas(self, drag: Measured) -> Measured:
+        """Drag of the mean speed of all species, from that of the first."""
+        return Measured(self._relative_drag * drag.value, self._relative_drag * drag.error)
+
+    def _drives(self, losses: FlightLosses, decay: Decay) -> bool:
+        """Whether beads that fall across the tray gain more than a small part of their energy."""
+        work = float(np.hypot(*losses.acceleration)) * max(self._tray.dimensions[:2])
+        return work > _MAX_WORK * float(np.mean(decay.speed**2))
+
     def _sources(
-        self, integrated: NDArray[np.float64], contacts: ContactTerms, *, decays: int = 1
+        self,
+        integrated: NDArray[np.float64],
+        contacts: ContactTerms,
+        losses: FlightLosses,
+        *,
+        decays: int,
     ) -> RestitutionSources:
         return restitution_sources(
-            self._tables, integrated, contacts, self._prior, decay_counts=decays > 0
+            self._tables, integrated, contacts, self._prior, decay_counts=decays > 0, losses=losses
         )
 
     def _means(
-        self, likelihood: DecayLikelihood, contacts: ContactTerms, *, final: bool, trusted: bool
+        self, own: CycleLikelihoods, *, final: bool, trusted: bool
     ) -> tuple[Measured, Measured]:
         """Mean restitutions of beads and of walls, of all finished cycles.
 
@@ -238,7 +288,6 @@ class DecayLibraryMethod:
         """
         if not final:
             return self._means_so_far
-        own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=contacts)
         own = own if trusted else own.without_decay()
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
@@ -258,6 +307,7 @@ class DecayLibraryMethod:
             decay is None
             or contacts is None
             or decay.deviation.shape[-1] != self._tables.mean.shape[0]
+            or len(decay.rough) != len(self._tables.rough)
         ):
             raise FitError(
                 f'tray {self._tray.number}',
@@ -265,7 +315,9 @@ class DecayLibraryMethod:
                 'analyse their recordings again',
             )
         decays = evidence.cycles - evidence.by_contacts
-        sources = self._sources(decay.integrated(), contacts, decays=decays)
+        losses = flight_losses(evidence.flights, self._drag_prior)
+        friction = friction_weights(self._prior, contacts)
+        sources = self._sources(decay.integrated(friction), contacts, losses, decays=decays)
         intervals, means = sources.intervals(self._ends), sources.means
         restitution, wall_restitution = (
             MeasuredInterval(mean.value, mean.error, interval.lower, interval.upper)
@@ -281,6 +333,7 @@ class DecayLibraryMethod:
             collisions=contacts.collisions,
             headline=sources.headline,
             wall_friction=sources.wall_friction,
+            drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> CycleRestitution:

@@ -20,7 +20,6 @@ from nanorocks_ros.inference.decay.decay_likelihood import (
 )
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.posterior import posterior_of
-from nanorocks_ros.inference.restitution_sources import decay_walls
 from nanorocks_ros.settings import PipelineSettings
 
 if TYPE_CHECKING:
@@ -64,7 +63,11 @@ class LibraryDecay:
 
 
 def library_decay(
-    tray: Tray, cycles: Sequence[CycleSpeeds], curve: SpeedCurve, start: float = 0.0
+    tray: Tray,
+    cycles: Sequence[CycleSpeeds],
+    curve: SpeedCurve,
+    start: float = 0.0,
+    walls: tuple[float, float] | None = None,
 ) -> LibraryDecay:
     """Fit measured decays by the library of their tray.
 
@@ -76,6 +79,8 @@ def library_decay(
         Mean of the cycles over the times that are used.
     start : float, [s]
         When the gas begins to cool, since the shaking event.
+    walls : tuple of 2 floats, optional
+        Ends of the flat prior of the wall restitution; the default one if not given.
 
     Raises
     ------
@@ -100,21 +105,25 @@ def library_decay(
         likelihoods.append(decay_likelihood(tables, *decay, camera))
     together = reduce(add, likelihoods)
     integrated = together.integrated()
-    posterior = posterior_of(
-        tables, integrated, decay_walls((prior.min_wall_restitution, prior.max_wall_restitution))
+    low, high = walls or (prior.min_wall_restitution, prior.max_wall_restitution)
+    posterior = posterior_of(tables, integrated, (low, high))
+    # At least one node of the walls: the nearest.
+    off = np.maximum(
+        np.maximum(low - tables.wall_restitution, tables.wall_restitution - high), 0.0
     )
+    possible = np.where(off <= off.min(), integrated.reshape(-1, off.size), -np.inf).ravel()
     ends = np.array([0.5, 0.5 - _HALF, 0.5 + _HALF])
-    beads, walls = posterior.quantiles(ends), posterior.wall_quantiles(ends)
+    beads, sides = posterior.quantiles(ends), posterior.wall_quantiles(ends)
     cooling = curve.times >= first - 1e-9
     speed, initial = _best_decay(
-        tables, together, integrated, curve.times[cooling] - start, curve.speed[cooling], camera
+        tables, together, possible, curve.times[cooling] - start, curve.speed[cooling], camera
     )
     return LibraryDecay(
         times=curve.times[cooling],
         speed=speed,
         initial_speed=initial,
         restitution=(float(beads[0]), float(beads[1]), float(beads[2])),
-        wall_restitution=(float(walls[0]), float(walls[1]), float(walls[2])),
+        wall_restitution=(float(sides[0]), float(sides[1]), float(sides[2])),
     )
 
 
@@ -131,8 +140,9 @@ def _best_decay(
     # Likeliest nuisance parameters there, in standard deviations.
     matrix = np.eye(likelihood.gradient.shape[1]) + likelihood.information[best_point]
     offsets = np.linalg.solve(matrix, likelihood.gradient[best_point])
-    nuisances, (scale, bias) = offsets[: -len(camera)], offsets[-len(camera) :] * np.array(camera)
-    mean = tables.mean[best_point] + nuisances @ tables.slopes[best_point]
+    of_tray = tables.slopes.shape[1]
+    scale, bias = offsets[of_tray : of_tray + len(camera)] * np.array(camera)
+    mean = tables.mean[best_point] + offsets[:of_tray] @ tables.slopes[best_point]
     log_distances = np.log(tables.decays.distances)
     bias_term = bias * (np.log(speed) - np.log(speed).mean())
 

@@ -13,10 +13,12 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay.decay_library import NUISANCES, count_step, tray_key
 from nanorocks_ros.inference.decay.decay_library_file import library_arrays
+from nanorocks_ros.inference.decay.friction_terms import FRICTION, TANGENTIAL
 from nanorocks_ros.inference.decay.library_fit import (
     Decays,
     distances,
     fewest_nodes,
+    fewest_rough_nodes,
     fit_library,
     node_of,
 )
@@ -44,6 +46,10 @@ _SLOWER, _FASTER = 0.3, 3.0
 _TIMES = 150
 _DECAYS = 'log_speed'
 _NODES_IN_TASK = 4
+# Rough nodes have random numbers of their own.
+_FIRST_ROUGH = 1 << 20
+# Smallest speed over the first.
+_REST = 1e-100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +60,9 @@ class LibraryPlan:
     ----------
     tray : Tray
     nodes : int
-        Number of points in the space of restitutions and nuisance parameters.
+        Number of points in the space of restitutions and nuisance parameters, with smooth beads.
+    rough_nodes : int
+        Further points, with beads that rub; 0: the library knows smooth beads alone.
     runs : int
         Runs at each node.
     seed : int
@@ -66,6 +74,7 @@ class LibraryPlan:
     tray: Tray
     nodes: int
     runs: int
+    rough_nodes: int = 0
     seed: int = 1
     drag: float = 0.0
 
@@ -75,6 +84,7 @@ class LibraryPlan:
             {
                 'version': __version__,
                 'nodes': self.nodes,
+                'rough_nodes': self.rough_nodes,
                 'runs': self.runs,
                 'seed': self.seed,
                 'tray': json.loads(tray_key(self.tray, self.drag)),
@@ -88,6 +98,7 @@ class _Nodes:
 
     plan: LibraryPlan
     numbers: tuple[int, ...]
+    rough: bool = False
 
 
 def build_library(
@@ -133,28 +144,48 @@ def build_library(
             f'{plan.nodes}, {plan.runs}',
             f'give {fewest_nodes()} and 2 or more: fewer do not give an error estimate',
         )
+    if 0 < plan.rough_nodes < fewest_rough_nodes():
+        raise ConfigurationError(
+            '--rough-nodes', f'{plan.rough_nodes}', f'give 0, or {fewest_rough_nodes()} or more'
+        )
     # A drag out of range is refused before any work.
     _simulated(plan, 0)
     workers = workers or Workers()
     workers.check()
     with resumed_journal(output, plan.specification(), notice) as journal:
         fill_journal(journal, cool_nodes, _tasks(plan), workers, progress)
-        library = fit_library(plan.tray, _decays(plan, journal), plan.specification(), plan.drag)
+        library = fit_library(
+            plan.tray,
+            _decays(plan, journal),
+            plan.specification(),
+            plan.drag,
+            _decays(plan, journal, rough=True) if plan.rough_nodes else None,
+        )
         write_archive(output, library_arrays(library))
     return library
 
 
 def _tasks(plan: LibraryPlan) -> dict[str, _Nodes]:
-    numbers = range(plan.nodes)
-    parts = (
-        numbers[first : first + _NODES_IN_TASK] for first in range(0, plan.nodes, _NODES_IN_TASK)
-    )
-    return {f'{part[0]}-{part[-1] + 1}': _Nodes(plan=plan, numbers=tuple(part)) for part in parts}
+    return {
+        _key(part, rough=rough): _Nodes(plan=plan, numbers=part, rough=rough)
+        for rough in (False, True)
+        for part in _parts(plan, rough=rough)
+    }
 
 
-def _decays(plan: LibraryPlan, journal: Journal) -> Decays:
-    parts = sorted(journal.keys(), key=lambda key: int(key.split('-')[0]))
-    nodes = [node_of(number) for number in range(plan.nodes)]
+def _parts(plan: LibraryPlan, *, rough: bool) -> list[tuple[int, ...]]:
+    numbers = range(plan.rough_nodes if rough else plan.nodes)
+    starts = range(0, len(numbers), _NODES_IN_TASK)
+    return [tuple(numbers[first : first + _NODES_IN_TASK]) for first in starts]
+
+
+def _key(numbers: tuple[int, ...], *, rough: bool) -> str:
+    return f'{"rough-" if rough else ""}{numbers[0]}-{numbers[-1] + 1}'
+
+
+def _decays(plan: LibraryPlan, journal: Journal, *, rough: bool = False) -> Decays:
+    parts = _parts(plan, rough=rough)
+    nodes = [node_of(number, rough=rough) for part in parts for number in part]
 
     def column(name: str) -> NDArray[np.float64]:
         return np.array([node[name] for node in nodes])
@@ -164,17 +195,29 @@ def _decays(plan: LibraryPlan, journal: Journal) -> Decays:
         wall_restitution=column('wall_restitution'),
         floor_lid_restitution=column('floor_lid_restitution'),
         nuisances=np.column_stack([column(name) for name in NUISANCES]),
-        log_speed=np.concatenate([journal.read(key)[_DECAYS] for key in parts]),
+        friction=np.column_stack([column(name) for name in FRICTION]),
+        log_speed=np.concatenate(
+            [journal.read(_key(part, rough=rough))[_DECAYS] for part in parts]
+        ),
     )
 
 
 def cool_nodes(task: _Nodes) -> Arrays:
     """The decays of some nodes: ``log_speed`` (n_nodes, n_runs, n_x)."""
-    return {_DECAYS: np.stack([cool_node(task.plan, number) for number in task.numbers])}
+    nodes = [cool_node(task.plan, number, rough=task.rough) for number in task.numbers]
+    return {_DECAYS: np.stack(nodes)}
 
 
-def cool_node(plan: LibraryPlan, number: int) -> NDArray[np.float64]:
+def cool_node(plan: LibraryPlan, number: int, *, rough: bool = False) -> NDArray[np.float64]:
     """Decays of the runs at one node, ln f, (n_runs, n_x).
+
+    Parameters
+    ----------
+    plan : LibraryPlan
+    number : int
+        Of the node.
+    rough : bool
+        Whether it is one of the rough ones.
 
     Raises
     ------
@@ -185,10 +228,13 @@ def cool_node(plan: LibraryPlan, number: int) -> NDArray[np.float64]:
 
     x = distances()
     times = np.geomspace(x[0] / (_FASTER * MEAN_SPEED), x[-1] / (_SLOWER * MEAN_SPEED), _TIMES)
-    settings, tray = _simulated(plan, number)
-    runs = [(number << 32) + run for run in range(plan.runs)]
+    settings, tray = _simulated(plan, number, rough=rough)
+    first = number + (_FIRST_ROUGH if rough else 0)
+    runs = [(first << 32) + run for run in range(plan.runs)]
     speed = cooling_runs(settings, tray, np.concatenate(([0.0], times)), runs).mean_projected_speed
     start = speed[:, :1]
+    # Beads that rub may come to rest, in the end of all digits.
+    speed = np.maximum(speed, _REST * start)
     return np.array(
         [
             np.interp(np.log(x), np.log(times * first[0]), np.log(curve[1:] / first[0]))
@@ -197,9 +243,11 @@ def cool_node(plan: LibraryPlan, number: int) -> NDArray[np.float64]:
     )
 
 
-def _simulated(plan: LibraryPlan, number: int) -> tuple[SimulationSettings, Tray]:
+def _simulated(
+    plan: LibraryPlan, number: int, *, rough: bool = False
+) -> tuple[SimulationSettings, Tray]:
     """Settings and tray of a node."""
-    node = node_of(number)
+    node = node_of(number, rough=rough)
     tray = plan.tray
     index = max(range(len(tray.species)), key=lambda k: tray.species[k].count)
     most_frequent = tray.species[index]
@@ -223,6 +271,15 @@ def _simulated(plan: LibraryPlan, number: int) -> tuple[SimulationSettings, Tray
         'mean_speed': MEAN_SPEED,
         'drag': plan.drag,
     }
+    if rough:
+        tangential = TANGENTIAL + node['tangential']
+        friction = node['wall_friction']
+        values |= {
+            'tangential_restitution': tangential,
+            'wall_tangential_restitution': tangential,
+            'wall_friction': friction,
+            'friction': friction * math.exp(node['bead_friction']),
+        }
     return (
         with_values(SimulationSettings(), values, 'decay library'),
         replace(tray, species=tuple(species), dimensions=(length, width, height + node['height'])),

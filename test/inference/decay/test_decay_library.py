@@ -16,6 +16,7 @@ from nanorocks_ros.inference.decay.decay_library_file import (
     library_of,
     load_library,
 )
+from nanorocks_ros.inference.decay.friction_terms import FRICTION
 from nanorocks_ros.inference.decay.library_fit import node_of
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -24,13 +25,14 @@ from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, cool_
 TRAYS = load_trays()
 
 
-def at_node(library, number):
-    node = {name: np.array([value]) for name, value in node_of(number).items()}
+def at_node(library, number, *, rough=False):
+    node = {name: np.array([value]) for name, value in node_of(number, rough=rough).items()}
     return library.log_speed(
         node['restitution'],
         node['wall_restitution'],
         node['floor_lid_restitution'],
         np.column_stack([node[name] for name in NUISANCES]),
+        np.column_stack([node[name] for name in FRICTION]) if rough else None,
     )[0]
 
 
@@ -45,6 +47,18 @@ def test_every_tray_has_a_library_that_agrees_with_a_new_simulation_of_a_node(tr
     off = at_node(library, number) - runs.mean(axis=0)
     assert np.abs(off).mean() < 2.0 * error.mean() + library.misfit
     assert library.misfit < 0.08
+
+
+def test_the_library_agrees_with_a_new_simulation_of_a_rough_node():
+    tray = TRAYS[1]
+    library = library_of(tray)
+    runs = cool_node(LibraryPlan(tray=tray, nodes=1600, runs=24), 5, rough=True)
+    error = runs.std(axis=0, ddof=1) / np.sqrt(24)
+    off = at_node(library, 5, rough=True) - runs.mean(axis=0)
+    friction = node_of(5, rough=True)['wall_friction']
+    assert friction > 0.001
+    most = 2.0 * error.mean() + library.misfit + library.friction_misfit * friction
+    assert np.abs(off).mean() < most
 
 
 def test_the_mean_decay_of_a_gas_that_was_not_in_it_is_that_of_the_library():

@@ -10,7 +10,8 @@ import pytest
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
-from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.decay_tables import FRICTIONS, tables_of
+from nanorocks_ros.records import Measured
 from nanorocks_ros.settings import PriorSettings
 
 TRAY = load_trays()[1]
@@ -45,6 +46,24 @@ def test_nuisances_are_integrated_over_as_by_a_determinant_and_an_inverse():
     np.testing.assert_allclose(likelihood.integrated(), expected, rtol=1e-11, atol=1e-11)
 
 
+def test_frictions_are_compared_up_to_the_next_one_above_the_highest(tables):
+    decay = TIMES, SPEEDS, 0.02 * SPEEDS, (0.01, 0.01)
+    whole = decay_likelihood(tables, *decay)
+    assert [friction for friction, _ in whole.rough] == list(FRICTIONS)
+    some = decay_likelihood(tables, *decay, highest_friction=0.01)
+    assert [friction for friction, _ in some.rough] == [0.004, 0.012]
+    for (_, one), (_, other) in zip(some.rough, whole.rough, strict=False):
+        np.testing.assert_array_equal(one.log_likelihood, other.log_likelihood)
+    none = decay_likelihood(tables, *decay, highest_friction=0.0)
+    assert none.rough == ()
+    np.testing.assert_array_equal(none.integrated(), whole.integrated())
+    twice = whole + whole
+    assert [friction for friction, _ in twice.rough] == list(FRICTIONS)
+    np.testing.assert_allclose(
+        twice.rough[-1][1].log_likelihood, 2.0 * whole.rough[-1][1].log_likelihood
+    )
+
+
 def test_the_best_amplitude_leaves_residuals_that_no_other_makes_smaller(tables):
     likelihood = decay_likelihood(tables, TIMES, SPEEDS, 0.02 * SPEEDS, (0.01, 0.01))
     place = int(np.argmax(likelihood.log_likelihood))
@@ -73,3 +92,39 @@ def test_the_best_amplitude_leaves_residuals_that_no_other_makes_smaller(tables)
         costs.append(residual @ np.linalg.solve(matrix, residual))
     assert likelihood.deviation[place] == pytest.approx(min(costs), rel=0.1)
     assert likelihood.samples == len(log_time)
+
+
+def test_a_dragged_decay_is_read_as_that_of_the_gas_without_drag(tables):
+    drag = 0.05
+    still = TIMES / (1.0 + 0.5 * drag * TIMES)
+    dragged_times = -np.log1p(-drag * still) / drag
+    speeds = np.interp(still, TIMES, SPEEDS) * np.exp(-drag * dragged_times)
+    camera = (0.01, 0.01)
+    read = decay_likelihood(
+        tables, dragged_times, speeds, 0.02 * speeds, camera, Measured(drag, 0.0)
+    )
+    same = np.interp(still, TIMES, SPEEDS)
+    expected = decay_likelihood(tables, still, same, 0.02 * same, camera)
+    np.testing.assert_allclose(read.integrated(), expected.integrated(), atol=1e-6)
+
+
+@pytest.mark.parametrize('drag', [0.0, 0.03])
+def test_the_gradient_by_the_drag_is_that_of_likelihoods_for_other_drags(tables, drag):
+    error, step = 1e-2, 1e-2
+
+    def at(value):
+        measured = Measured(value, error)
+        return decay_likelihood(tables, TIMES, SPEEDS, 0.05 * SPEEDS, (0.0, 0.0), measured)
+
+    # The number of bins changes with the clock, and all likelihoods with it: only the difference
+    # between restitutions counts.
+    best = int(np.argmax(at(drag).log_likelihood))
+    beads = int(np.argmin(np.abs(tables.restitution - 0.5)))
+    walls = int(np.argmin(np.abs(tables.wall_restitution - 0.9)))
+    other = beads * tables.wall_restitution.size + walls
+    high, low = (at(drag + sign * step).log_likelihood for sign in (1.0, -1.0))
+    slopes = (high - low) / (2.0 * step) * error
+    gradient = at(drag).gradient[:, -1]
+    expected = slopes[best] - slopes[other]
+    assert abs(expected) > 5.0
+    assert gradient[best] - gradient[other] == pytest.approx(expected, rel=0.25)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bent_flights import bent_flights
 from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.errors import ConfigurationError
@@ -16,6 +17,7 @@ from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     CorRelation,
     CorStatus,
+    Headline,
     Measured,
     Merge,
     Quality,
@@ -162,7 +164,7 @@ def test_a_decay_that_tells_too_little_says_so():
         replace(
             record,
             mean_projected_speed=Measured(
-                record.mean_projected_speed.value, 0.5 * record.mean_projected_speed.value
+                record.mean_projected_speed.value, 0.8 * record.mean_projected_speed.value
             ),
         )
         for record in simulated_cycle()
@@ -385,6 +387,49 @@ def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
     *_, final = all_estimates(fitter(), by_stamp([*speeds, *seen]))
     assert final.tension > 3.0
     assert final.quality & Quality.INCONSISTENT
+
+
+def with_flights(drag, acceleration=(0.0, 0.0)):
+    """The final estimate of a simulated cycle in vacuum, with such flights and 40 rebounds."""
+    rebounds = wall_rebounds(np.random.default_rng(1), 40, 2.0, 17.0)
+    flights = bent_flights(200, drag, acceleration, first_ns=2 * NS)
+    *_, final = all_estimates(fitter(), by_stamp([*simulated_cycle(), *rebounds, *flights]))
+    return final
+
+
+def test_flights_give_drag_and_an_upper_limit_of_the_acceleration():
+    final = with_flights(0.0)
+    assert abs(final.drag.value) < 3.0 * final.drag.error < 0.01
+    assert 0.0 < final.acceleration.upper < 2e-5
+    assert Quality.ACCELERATED not in final.quality
+    assert final.headline is Headline.JOINT
+
+
+def test_without_flights_neither_is_known():
+    *_, final = all_estimates(fitter(), simulated_cycle())
+    assert not final.drag.known
+    assert math.isnan(final.acceleration.upper)
+
+
+def test_a_drag_is_taken_out_of_the_decay():
+    still, slowed = with_flights(0.0), with_flights(0.03)
+    assert slowed.drag.value == pytest.approx(0.03, abs=0.003)
+    # Part of the cooling is that of the gas: the beads lose less than without it.
+    assert slowed.decay_restitution.value > still.decay_restitution.value + 0.01
+
+
+def test_a_decay_of_accelerated_beads_does_not_count():
+    final = with_flights(0.0, (2e-4, 0.0))
+    assert final.quality & Quality.ACCELERATED
+    assert final.headline is Headline.CONTACTS
+    assert final.acceleration.lower < 2e-4 < final.acceleration.upper
+    assert final.wall_restitution == final.contact_wall_restitution
+
+
+def test_a_small_acceleration_is_published_without_a_flag():
+    final = with_flights(0.0, (1.5e-5, 0.0))
+    assert final.acceleration.lower > 0.0
+    assert Quality.ACCELERATED not in final.quality
 
 
 def test_contacts_of_all_cycles_count_in_the_mean():

@@ -13,7 +13,7 @@ from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library import tray_key
 from nanorocks_ros.inference.decay.decay_library_file import library_of, load_library
-from nanorocks_ros.inference.decay.library_fit import distances
+from nanorocks_ros.inference.decay.library_fit import distances, fewest_rough_nodes
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.studies.libraries.decay_simulations import (
     MEAN_SPEED,
@@ -56,6 +56,25 @@ def test_an_interrupted_build_goes_on_and_ends_in_the_same_library(tmp_path):
     np.testing.assert_array_equal(uninterrupted.covariance, resumed.covariance)
     assert uninterrupted.tray == tray_key(PLAN.tray)
     assert not path.with_name('mine.npz.parts').exists()
+
+
+def test_a_library_with_rough_beads_is_that_of_smooth_ones_and_what_friction_adds(tmp_path):
+    few = replace(PLAN.tray, species=(replace(TRAY.species[0], count=2),))
+    plan = replace(PLAN, tray=few, rough_nodes=fewest_rough_nodes())
+    counts = []
+    rough = build_library(plan, tmp_path / 'rough.npz', HERE, lambda *done: counts.append(done))
+    assert counts[-1] == (64 + 47, 64 + 47)
+    smooth = build_library(replace(plan, rough_nodes=0), tmp_path / 'smooth.npz', HERE)
+    assert rough.rough
+    assert not smooth.rough
+    np.testing.assert_array_equal(rough.coefficients, smooth.coefficients)
+    points = np.array([0.8]), np.array([0.95])
+    friction = np.array([[0.05, 0.0, 0.0]])
+    slower = rough.log_speed(*points, None, None, friction) - smooth.log_speed(*points)
+    assert slower[0, 30:].mean() < -0.1
+    loaded = load_library(str(tmp_path / 'rough.npz'), packaged=False)
+    np.testing.assert_array_equal(loaded.friction_coefficients, rough.friction_coefficients)
+    assert load_library(str(tmp_path / 'smooth.npz'), packaged=False).rough is False
 
 
 def test_parts_of_another_library_are_not_mixed_in(tmp_path):
@@ -101,4 +120,6 @@ def test_too_few_nodes_are_refused_before_any_work(tmp_path):
     for plan in (replace(PLAN, nodes=253), replace(PLAN, runs=1)):
         with pytest.raises(ConfigurationError, match='give 254 and 2 or more'):
             build_library(plan, tmp_path / 'mine.npz', HERE)
+    with pytest.raises(ConfigurationError, match=r'give 0, or 188 or more'):
+        build_library(replace(PLAN, rough_nodes=187), tmp_path / 'mine.npz', HERE)
     assert not list(tmp_path.iterdir())
