@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.records import CorRelation
+from nanorocks_ros.settings import priors_in_words
 
 if TYPE_CHECKING:
     import argparse
@@ -144,7 +145,6 @@ def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
     from nanorocks_ros.studies.analysis.cycle_words import (
         cycle_lines,
         is_decay_left_out,
-        prior_text,
         tray_reason,
         used_speeds,
         wall_prior,
@@ -161,7 +161,7 @@ def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
     cycles = last_of_each_cycle(results.cors)
     used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
     ends = ends_of_cycles(results.clusters)
-    lines = [prior_text(analysis.prior)]
+    lines = [f'priors: {priors_in_words(analysis.prior)}']
     left_out = 0
     for cor in cycles:
         is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)

@@ -9,13 +9,14 @@ import json
 import math
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.safe_text import counted, printable
-from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings, PriorSettings, priors_in_words
 
 if TYPE_CHECKING:
     import argparse
@@ -93,9 +94,14 @@ def run_many(options: argparse.Namespace) -> int:
         _notice(text)
     report = write_batch(folder, batch, combined_results, settings, options.format)
     if options.json:
-        print(json.dumps(_as_json(batch, combined_results, folder, report), allow_nan=False))
+        values = {
+            **_as_json(batch, combined_results, settings.prior),
+            'results': printable(folder),
+            'report': printable(report),
+        }
+        print(json.dumps(values, allow_nan=False))
     else:
-        _print(batch, combined_results)
+        _print(batch, combined_results, settings.prior)
     _notice(f'results in {printable(folder)}, report in {printable(report)}')
     return _report_failures(batch)
 
@@ -114,9 +120,7 @@ def _report_failures(batch: Batch) -> int:
     return 1
 
 
-def _as_json(
-    batch: Batch, combined_results: Combined, folder: Path, report: Path
-) -> dict[str, Any]:
+def _as_json(batch: Batch, combined_results: Combined, prior: PriorSettings) -> dict[str, Any]:
     from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
     return {
@@ -145,12 +149,11 @@ def _as_json(
             {'bag': failure.name, 'reason': failure.reason, 'analysed': failure.analysed}
             for failure in batch.failed
         ],
-        'results': printable(folder),
-        'report': printable(report),
+        'priors': asdict(prior),
     }
 
 
-def _print(batch: Batch, combined_results: Combined) -> None:
+def _print(batch: Batch, combined_results: Combined, prior: PriorSettings) -> None:
     from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 
     frames = sum(result.summary['frames'] for result in batch.results)
@@ -158,6 +161,8 @@ def _print(batch: Batch, combined_results: Combined) -> None:
     print(f'{counted(len(batch.results), "recording")}, {frames} frames, {seconds:.0f} s')
     for text in merged_notes(batch.results):
         print(text)
+    if any(tray.restitution is not None for tray in combined_results.trays.values()):
+        print(f'priors: {priors_in_words(prior)}')
     for number, tray in sorted(combined_results.trays.items()):
         cycles, recordings = counted(tray.cycles, 'cycle'), counted(tray.recordings, 'recording')
         print(f'tray {number}: {cycles} of {recordings}')

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
-from nanorocks_ros.records import Merge, PairCollision, Rebound, SpeedEstimate
+from nanorocks_ros.records import FreeFlight, Merge, PairCollision, Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.wire import topics
@@ -23,6 +23,7 @@ _INPUTS = (
     (topics.SPEED, SpeedEstimate),
     (topics.REBOUND, Rebound),
     (topics.COLLISION, PairCollision),
+    (topics.FLIGHT, FreeFlight),
     (topics.MERGE, Merge),
 )
 # Times are only compared with each other, so any epoch does.
@@ -55,6 +56,7 @@ class HaffFitterNode(NanorocksNode):
 
     def _adopt(self, settings: PipelineSettings, stages: dict[int, RestitutionEstimator]) -> None:
         self._settings, self._stages = settings, stages
+        self.diagnostics.note_priors(settings.prior)
 
     def _receive(
         self, topic: Topic, record_type: type[Any], tray: int, message: Float32MultiArray

@@ -141,6 +141,7 @@ class PipelineNode(NanorocksNode):
     def _adopt(self, settings: st.PipelineSettings, pipeline: Pipeline) -> None:
         self._background.drain()
         self._settings, self._pipeline = settings, pipeline
+        self.diagnostics.note_priors(settings.prior)
         pipeline.prepare()
         self._track_images = TrackImages(self, calibrated(settings).preprocess.pixels_per_metre)
 

@@ -16,6 +16,7 @@ from nanorocks_ros.records import (
     BodyEstimate,
     CorEstimate,
     Frame,
+    FreeFlight,
     Merge,
     MotionMask,
     Notice,
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 Result = TrayImage | MotionMask | Tracks | Autocorrelation | ArrayRecord | Notice
+
+_OF_RESTITUTION = SpeedEstimate | Rebound | PairCollision | FreeFlight | Merge
 
 
 class Wanted(NamedTuple):
@@ -105,7 +108,7 @@ class TrayStages:
         records: list[TrayRecord | CorEstimate] = []
         for record in measured:
             records.append(record)
-            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
+            if isinstance(record, _OF_RESTITUTION):
                 records += self.restitution.push(record)
             if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
                 self.clusters.push(record)

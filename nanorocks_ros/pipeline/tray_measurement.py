@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import (
     BodyEstimate,
+    FreeFlight,
+    Measured,
     Merge,
     MotionMask,
     Notice,
@@ -36,7 +38,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-Event = Rebound | PairCollision | BodyEstimate | Merge
+Contact = Rebound | PairCollision | FreeFlight
+Event = Contact | BodyEstimate | Merge
 TrayRecord = SpeedEstimate | MotionMask | Tracks | Event | Notice
 
 _LONG_DOUBT_NS = 1_000_000_000
@@ -88,7 +91,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._cycle: tuple[int, int | None] = (0, None)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
-        self._contacts = ContactFinder(tray)
+        drag = Measured(settings.prior.drag, settings.prior.drag_error)
+        self._contacts = ContactFinder(tray, drag)
         self._bodies = BodyCounter(settings, tray)
         self._scale = ScaleCheck(settings, tray)
         self._track_speed = TrackSpeed(settings, tray, crowded=self._tracker.crowded)
@@ -188,7 +192,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             return []
         return self._in_cycle(self._contacts.push(tracks))
 
-    def _in_cycle(self, contacts: Iterable[Rebound | PairCollision]) -> list[Event]:
+    def _in_cycle(self, contacts: Iterable[Contact]) -> list[Event]:
         """The contacts with their cycle: some before a shaking event are known only after it."""
         cycle, start_ns = self._cycle
         return [

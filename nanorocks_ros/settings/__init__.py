@@ -24,6 +24,7 @@ from nanorocks_ros.settings.pipeline_settings import (
     SpeedSettings,
     TrackingSettings,
 )
+from nanorocks_ros.settings.prior_words import priors_in_words
 from nanorocks_ros.settings.restitution_settings import (
     CoolingSettings,
     PriorSettings,
@@ -78,6 +79,7 @@ __all__ = [
     'TrackingSettings',
     'Value',
     'WorkSettings',
+    'priors_in_words',
     'problem',
     'rows',
     'setting',

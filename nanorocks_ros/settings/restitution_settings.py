@@ -91,8 +91,7 @@ class PriorSettings:
 
     min_wall_restitution: float = setting(
         0.5,
-        'lower end of the flat prior of the wall restitution; decays were simulated from 0.78, so '
-        'that lower ones are told by rebounds alone',
+        'lower end of the flat prior of the wall restitution',
         deprecated='wall_low',
         low=0.5,
         high=1.0,
@@ -102,7 +101,7 @@ class PriorSettings:
         'upper end of the flat prior of the wall restitution; equal to the lower end if it is '
         'known',
         deprecated='wall_high',
-        low=0.78,
+        low=0.5,
         high=1.0,
     )
     floor_lid_spread: float = setting(
@@ -136,6 +135,27 @@ class PriorSettings:
         low=0.0,
         high=2.0,
     )
+    friction: float = setting(
+        0.0,
+        'coefficient of friction of beads on floor, lid and walls, such as measured with spare '
+        'beads; 0: unknown, to be told by rebounds, without which beads count as smooth',
+        low=0.0,
+        high=0.15,
+    )
+    friction_error: float = setting(
+        0.003,
+        'half of the probability of the friction is within this of `friction`; the prior has long '
+        'tails (Cauchy), so that rebounds can overrule it',
+        low=0.0,
+        high=1.0,
+    )
+    bead_friction_spread: float = setting(
+        0.5,
+        'standard deviation of the logarithm of the friction between beads over that of beads and '
+        'walls',
+        low=0.0,
+        high=1.0,
+    )
     scale_error: float = setting(
         0.005, 'relative standard error of the image scale', low=0.0, high=0.1
     )
@@ -158,6 +178,21 @@ class PriorSettings:
         '`speed_bias` of structure-function speeds in trays with grains',
         low=0.0,
         high=0.5,
+    )
+    drag: float = setting(
+        0.0,
+        'rate at which the gas slows a bead of the first species; the flights of each cycle '
+        'measure it',
+        '1/s',
+        low=0.0,
+        high=100.0,
+    )
+    drag_error: float = setting(
+        0.2,
+        'standard deviation of `drag` before the flights are seen; 0: it is known, as in a vacuum',
+        '1/s',
+        low=0.0,
+        high=100.0,
     )
     collision_bias: float = setting(
         0.008,

@@ -89,4 +89,5 @@ def assert_same_numbers(arrays, rounding, missed=None):
         else:
             assert len(left) <= 1, record_type
         same = expected[first : first + len(published)]
-        np.testing.assert_allclose(published, same, rtol=rounding, atol=1e-9)
+        # The drag, near 0, is a mean of velocity changes that single precision rounds on the way.
+        np.testing.assert_allclose(published, same, rtol=rounding, atol=1e-8)

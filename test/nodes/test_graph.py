@@ -68,6 +68,6 @@ def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
     keys = {
         pair.key for message in diagnostics for status in message.status for pair in status.values
     }
-    assert keys >= {'tray 1 quality', 'tray 1 speed'}
+    assert keys >= {'tray 1 quality', 'tray 1 speed', 'tray 1 COR', 'priors'}
     for stage in stages:
         assert graph.interrupt(stage).code == 0

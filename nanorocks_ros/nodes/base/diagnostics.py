@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import CorEstimate, Headline, SpeedEstimate, TrayImage
+from nanorocks_ros.settings import PriorSettings, priors_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -98,6 +99,10 @@ class Diagnostics:
             if record.headline is Headline.CONTACTS:
                 cor += ' by contacts alone'
             self.values[f'tray {record.tray} COR'] = cor
+
+    def note_priors(self, prior: PriorSettings) -> None:
+        """Keep what the node assumes of restitutions, for the next reports."""
+        self.values['priors'] = priors_in_words(prior)
 
     def publish(self, missing_publishers: Sequence[str]) -> None:
         """Publish everything.

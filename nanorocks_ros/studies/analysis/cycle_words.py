@@ -7,8 +7,14 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
-from nanorocks_ros.records import NS, CorStatus, Headline, SpeedMethod, headline_in_words
+from nanorocks_ros.records import (
+    NS,
+    CorStatus,
+    Headline,
+    Quality,
+    SpeedMethod,
+    headline_in_words,
+)
 from nanorocks_ros.records.result_words import (
     METHODS,
     NO_SHAKING,
@@ -32,7 +38,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PriorSettings
     from nanorocks_ros.studies.analysis.offline_analysis import TrayResults
 
-_MM = 1e3
+_MM, _MICRO = 1e3, 1e6
 
 
 @dataclass(slots=True)
@@ -75,20 +81,7 @@ def used_speeds(
 
 def wall_prior(prior: PriorSettings) -> WallPrior:
     """What is assumed of the walls."""
-    return WallPrior(prior.min_wall_restitution, prior.max_wall_restitution, LOWEST_WALL)
-
-
-def prior_text(prior: PriorSettings) -> str:
-    """The priors of both restitutions and of the larger systematic errors, for the terminal."""
-    low, high = prior.min_wall_restitution, prior.max_wall_restitution
-    walls = f'{low:g} to {high:g}' if low < high else f'{low:g}, known'
-    simulated = f' (decays from {LOWEST_WALL:g})' if low < LOWEST_WALL else ''
-    return (
-        f'priors: beads 0 to 1, walls {walls}{simulated}; common errors: scale '
-        f'{prior.scale_error:g}, collisions {prior.collision_bias:g}, rebounds '
-        f'{prior.rebound_bias:g}, diameter {prior.diameter_error:g}, height '
-        f'{_MM * prior.height_error:g} mm'
-    )
+    return WallPrior(prior.min_wall_restitution, prior.max_wall_restitution)
 
 
 def is_decay_left_out(cor: CorEstimate, *, include_inconsistent: bool) -> bool:
@@ -166,6 +159,7 @@ def cycle_lines(
     if reason is not None:
         lines.append(f'  reason: {reason.text}; {reason.remedy}')
     lines += _source_lines(cor)
+    lines += _flight_lines(cor)
     lines += _decay_lines(cor)
     if cor.samples:
         lines.append(f'  used: {_used_text(cor, used)}')
@@ -198,7 +192,8 @@ def _cor_text(cor: CorEstimate) -> str:
 
 
 def _headline(cor: CorEstimate) -> str:
-    return headline_in_words(cor.headline, cor.tension, cor.wall_friction)
+    accelerated = Quality.ACCELERATED in cor.quality
+    return headline_in_words(cor.headline, cor.tension, cor.wall_friction, accelerated=accelerated)
 
 
 def _source_lines(cor: CorEstimate) -> list[str]:
@@ -221,6 +216,16 @@ def _source_lines(cor: CorEstimate) -> list[str]:
             f'+- {cor.wall_friction.error:.4f}'
         )
     return lines
+
+
+def _flight_lines(cor: CorEstimate) -> list[str]:
+    """What slows or drives the beads between contacts; nothing where no flight told it."""
+    if not (cor.drag.known and math.isfinite(cor.acceleration.upper)):
+        return []
+    return [
+        f'  in flight: drag {cor.drag.value:.4f} +- {cor.drag.error:.4f} /s, acceleration below '
+        f'{_MICRO * cor.acceleration.upper:.1f} um/s^2'
+    ]
 
 
 def _known_interval(interval: Interval, digits: int) -> str:

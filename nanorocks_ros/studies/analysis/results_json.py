@@ -48,6 +48,8 @@ _RESTITUTIONS = (
     *('mean_restitution', 'mean_restitution_error'),
     *('mean_wall_restitution', 'mean_wall_restitution_error'),
     *BY_SOURCE,
+    *('drag', 'drag_error'),
+    *('acceleration', 'acceleration_error', 'acceleration_lower', 'acceleration_upper'),
 )
 _SPECIES_DECAYS = tuple(
     field.name for field in layout(CorEstimate).fields if '_species_' in field.name

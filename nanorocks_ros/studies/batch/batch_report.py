@@ -14,7 +14,8 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.html_report import Picture, Section, Table, number, write_report
 from nanorocks_ros.outputs.safe_text import counted
-from nanorocks_ros.settings import PipelineSettings, rows
+from nanorocks_ros.records import AGREEMENT_TENSION
+from nanorocks_ros.settings import PipelineSettings, priors_in_words, rows
 from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 from nanorocks_ros.studies.batch.batch_figure import decays_figure
 from nanorocks_ros.studies.batch.campaign_means import means_as_json
@@ -23,6 +24,7 @@ from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from nanorocks_ros.settings import PriorSettings
     from nanorocks_ros.studies.batch.batch_analysis import BagResults, Batch
     from nanorocks_ros.studies.batch.campaign_means import Combined, CycleRow, TrayMeans
 
@@ -60,7 +62,7 @@ def write_batch_report(
     try:
         with TemporaryDirectory() as scratch:
             sections = [
-                _restitutions(together),
+                _restitutions(together, settings.prior),
                 _clusters(together),
                 _figures(Path(scratch), batch, together),
                 *_cycles(together),
@@ -94,7 +96,7 @@ def _failures(batch: Batch) -> Section:
     )
 
 
-def _restitutions(together: Combined) -> Section:
+def _restitutions(together: Combined, prior: PriorSettings) -> Section:
     return Section(
         title='Restitution of all cycles together',
         parts=[
@@ -106,7 +108,8 @@ def _restitutions(together: Combined) -> Section:
                 'not known of tray, camera and start is the same in all of them: it is part of '
                 'the interval, and does not become less with more cycles. A dash: hardly known. '
                 'Source: joint, decays and contacts together; contacts, where decays disagree '
-                'with them (a tension beyond 2) or walls rub: then something happens that is not '
+                f'with them (a tension beyond {AGREEMENT_TENSION:g}) or walls rub: then something '
+                'happens that is not '
                 'simulated. Decays of such cycles are left out, unless '
                 'cooling.include_inconsistent is set; their contacts count.',
             ),
@@ -123,6 +126,7 @@ def _restitutions(together: Combined) -> Section:
                 'them over its 178 runs; in brackets how many cycles are known. v0 and tau count '
                 'where the fit knows them to half of their value.',
             ),
+            f'Assumed before anything is measured (priors): {priors_in_words(prior)}.',
             *(_unread(together)),
         ],
     )  # fmt: skip

@@ -17,7 +17,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.settings import SimulationSettings, with_values
+from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
 from nanorocks_ros.studies.decays.best_fit_decay import library_decay
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
 from nanorocks_ros.studies.decays.cooling_curves import check_errors, cooling_part, mean_cycle
@@ -203,7 +203,9 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
     ConfigurationError
         For invalid values.
     """
-    mean_speed = float(f'{_initial_speed(data, curve) / _PROJECTED:.2g}')
+    lowest = PriorSettings().min_wall_restitution
+    searched = max(min(search.walls), lowest), max(*search.walls, lowest)
+    mean_speed = float(f'{_initial_speed(data, curve, searched) / _PROJECTED:.2g}')
     settings = with_values(
         SimulationSettings(),
         {'tray': data.tray.number, 'seed': search.seed, 'mean_speed': mean_speed},
@@ -232,10 +234,10 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
     return {**plans, 'width': sweep_plan(fixed, widths, times, search.runs, keep_runs=True)}
 
 
-def _initial_speed(data: CorData, curve: SpeedCurve) -> float:
-    """Approximate mean projected speed at the start of the cooling, [m/s]."""
+def _initial_speed(data: CorData, curve: SpeedCurve, walls: tuple[float, float]) -> float:
+    """Approximate mean projected speed at the start of the cooling, [m/s], for some walls."""
     try:
-        return library_decay(data.tray, data.cycles, curve, data.start).initial_speed
+        return library_decay(data.tray, data.cycles, curve, data.start, walls).initial_speed
     except FitError:
         return float(curve.speed[0])
 

@@ -9,6 +9,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.settings import PriorSettings
 
 
 @pytest.fixture
@@ -62,3 +63,11 @@ def test_a_warning_and_a_missing_publisher_are_shown_in_this_order(report):
     node.diagnostics.warning = 'the disk is full'
     status, _ = next_status()
     assert (status.level, status.message) == (DiagnosticStatus.WARN, 'the disk is full')
+
+
+def test_the_priors_are_told_as_they_are_set_last(report):
+    node, next_status = report
+    node.diagnostics.note_priors(PriorSettings())
+    assert 'walls 0.5 to 1;' in next_status()[1]['priors']
+    node.diagnostics.note_priors(PriorSettings(min_wall_restitution=0.8))
+    assert 'walls 0.8 to 1;' in next_status()[1]['priors']

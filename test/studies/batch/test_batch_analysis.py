@@ -13,7 +13,7 @@ import signal
 import threading
 import time
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.recordings.bag.find_bags import find_bags
 from nanorocks_ros.records import Quality
-from nanorocks_ros.settings import PipelineSettings, with_values
+from nanorocks_ros.settings import PipelineSettings, PriorSettings, priors_in_words, with_values
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.result_tables import read_columns
 from nanorocks_ros.studies.batch import batch_task
@@ -186,6 +186,18 @@ def test_the_same_command_again_does_only_what_failed(done, capsys):
     assert table['restitution'].to_pylist() == [report['trays']['1']['restitution']]
     cycles = parquet.read_table(results / 'cycles.parquet')
     assert set(cycles['tray'].to_pylist()) == {1}
+
+
+def test_the_priors_are_told_with_the_restitutions(done, capsys):
+    results, report, _, _ = done
+    text = priors_in_words(PriorSettings())
+    assert report['priors'] == asdict(PriorSettings())
+    assert f'(priors): {text}.' in (results / 'report.html').read_text()
+    bags = Path(report['bags'][0]['bag']).parent
+    assert main(['analyse', str(bags), '-o', str(results), '--workers', '1']) == 1
+    lines = capsys.readouterr().out.splitlines()
+    tray = next(line for line in lines if line.startswith('tray 1: '))
+    assert f'priors: {text}' in lines[: lines.index(tray)]
 
 
 def test_the_report_shows_what_was_analysed_and_what_failed(done):
