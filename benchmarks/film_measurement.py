@@ -11,12 +11,14 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.place_errors import PlaceErrors, place_errors
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
+    FreeFlight,
     Merge,
     Notice,
     PairCollision,
@@ -68,6 +70,8 @@ class FilmResult:
         Of each species: beads seen over true beads, mean over frames.
     radii : tuple of float
         Of each species: median of the measured radii over the mean true one.
+    errors : tuple of PlaceErrors or None
+        Of each species: stated errors of places and radii over the true ones.
     """
 
     refusal: str = ''
@@ -78,6 +82,7 @@ class FilmResult:
     flagged_speeds: float = 0.0
     counts: tuple[float, ...] = ()
     radii: tuple[float, ...] = ()
+    errors: tuple[PlaceErrors | None, ...] = ()
 
     @property
     def final(self) -> CorEstimate | None:
@@ -149,6 +154,7 @@ class _Reading:
             flagged_speeds=self._flagged(speeds, epoch_ns),
             counts=self._counts(),
             radii=self._radii(epoch_ns),
+            errors=place_errors(self._film, self._tracks, epoch_ns),
         )
 
     def _keep(self, records: Iterable[Result], notices: list[str]) -> None:
@@ -168,7 +174,7 @@ class _Reading:
         estimator = RestitutionEstimator(settings, tray)
         estimates: list[CorEstimate] = []
         for record in self._records:
-            if isinstance(record, SpeedEstimate | Rebound | PairCollision | Merge):
+            if isinstance(record, SpeedEstimate | Rebound | PairCollision | FreeFlight | Merge):
                 estimates += estimator.push(record)
         return tuple(last_of_each_cycle([*estimates, *estimator.flush()]))
 

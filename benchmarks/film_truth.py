@@ -37,10 +37,16 @@ class FilmTruth:
     shake : float, [s]
         Time of the kick.
     scale : float, [px/m]
+    camera_height : float, [m]
+        Above the floor; infinite without perspective.
     region : tuple of 4 floats or empty, [px]
         Left, top, width and height of the floor; empty: in the middle of the picture.
-    positions, velocities : ndarray (frames, beads, 2), [m], [m/s]
-        From the corner of the floor, and relative to it.
+    positions : ndarray (frames, beads, 2), [m]
+        From the corner of the floor, where it is then.
+    velocities : ndarray (frames, beads, 2), [m/s]
+        In space, as speeds are measured: a plate that swings does not move the beads above it.
+    heights : ndarray (frames, beads), [m]
+        Above the floor.
     radii : ndarray (beads,), [m]
     species : ndarray of int, (beads,)
     merges : ndarray (merges,), [s]
@@ -56,12 +62,19 @@ class FilmTruth:
     frame_rate: float
     shake: float
     scale: float
+    camera_height: float
     region: tuple[float, ...]
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
+    heights: NDArray[np.float64]
     radii: NDArray[np.float64]
     species: NDArray[np.int64]
     merges: NDArray[np.float64]
+
+    @cached_property
+    def magnification(self) -> NDArray[np.float64]:
+        """Size of each bead in the picture over that on the floor, (frames, beads)."""
+        return 1.0 / (1.0 - self.heights / self.camera_height)
 
     @cached_property
     def mean_projected_speed(self) -> NDArray[np.float64]:
@@ -82,9 +95,9 @@ def read_truth(video: Path) -> FilmTruth:
     with np.load(video.with_suffix('.npz')) as archive:
         arrays = dict(archive)
     asked, scale, region = _asked(arrays)
+    height = _camera_height(arrays)
     rate = float(arrays['fps'])
     displacement = arrays['D'].astype(np.float64)
-    swing = rate * np.gradient(displacement, axis=0)
     spread = any(asked.get(name) for name in ('va', 'vb'))
     friction = any(asked.get(name) for name in ('mu', 'muw'))
     return FilmTruth(
@@ -97,13 +110,21 @@ def read_truth(video: Path) -> FilmTruth:
         frame_rate=rate,
         shake=float(arrays['pre']),
         scale=scale,
+        camera_height=height,
         region=region,
         positions=arrays['P'][..., :2].astype(np.float64) - displacement[:, np.newaxis],
-        velocities=arrays['V'][..., :2].astype(np.float64) - swing[:, np.newaxis],
+        velocities=arrays['V'][..., :2].astype(np.float64),
+        heights=arrays['P'][..., 2].astype(np.float64),
         radii=arrays['rad'].astype(np.float64),
         species=arrays['sp'].astype(np.int64),
         merges=np.asarray(arrays['merges'], dtype=np.float64).reshape(-1, 3)[:, 0],
     )
+
+
+def _camera_height(arrays: dict[str, NDArray[np.generic]]) -> float:
+    """Height of the camera above the floor, [m]."""
+    scene = json.loads(str(arrays['settings']))['scene'] if 'settings' in arrays else {}
+    return float(scene.get('camera_height', 0.0)) or float('inf')
 
 
 def _asked(

@@ -54,6 +54,8 @@ _SECONDS = 26.0
 # Mean speeds after the kick, drawn with uniform logarithm, [m/s].
 _SPEEDS = (6e-3, 14e-3)
 _HALF_WIDTHS = 3.0
+# Factor within which stated errors count as right.
+_FACTOR = 1.5
 # Part of the cameras that jitter or sway.
 _MOVING = 0.2
 
@@ -72,12 +74,16 @@ def report() -> None:
     missing = {key: film for key, film in drawn.items() if not _video(*film)}
     with Progress('drawing films') as progress:
         run_tasks(_draw, missing, Workers(), progress.count)
-    print_drawn(_measured(films_drawn()))
+    read = _measured(films_drawn())
+    print_drawn(read)
     foreign = films_by_other_code()
     if foreign:
-        print_foreign(_measured(foreign))
+        read_foreign = _measured(foreign)
+        print_foreign(read_foreign)
+        read += read_foreign
     else:
         print(f'\nNo films by other code: set {FOREIGN} to a folder that holds some.')
+    print_errors(read)
 
 
 def films_drawn() -> list[Path]:
@@ -158,7 +164,8 @@ def _code_key() -> str:
     """Key of the code that measures."""
     here = Path(__file__).resolve().parent
     files = sorted((here.parent / 'nanorocks_ros').rglob('*.py'))
-    files += [here / 'film_measurement.py', here / 'film_truth.py']
+    names = ('film_measurement.py', 'film_truth.py', 'place_errors.py')
+    files += [here / name for name in names]
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
@@ -294,6 +301,24 @@ def _foreign_row(film: FilmTruth, result: FilmResult) -> str:
     return row + f'| {_verdict(film, result)} |'
 
 
+def print_errors(read: list[_Read]) -> None:
+    """Print stated errors of places and radii over the true ones, film by film."""
+    print('\nErrors of places and radii, by species\n')
+    print('| film | px/mm | true error [px] | between frames | stated / true | radii |')
+    print('| --- ' * 6 + '|')
+    for read_film in read:
+        errors = [error for error in read_film.result.errors if error]
+        columns = [
+            [f'{getattr(error, name):.2f}' for error in errors]
+            for name in ('true', 'white', 'place_ratio', 'radius_ratio')
+        ]
+        cells = ' | '.join(', '.join(column) for column in columns)
+        print(f'| {read_film.film.video.stem} | {read_film.film.scale / 1000.0:.1f} | {cells} |')
+    ratios = [error.place_ratio for film in read for error in film.result.errors if error]
+    inside = np.mean([1.0 / _FACTOR <= ratio <= _FACTOR for ratio in ratios])
+    print(f'\nPlaces: within a factor of {_FACTOR:g} in {inside:.2f} of films and species.')
+
+
 def _verdict(film: FilmTruth, result: FilmResult) -> str:
     """Whether the restitution is right, flagged, or wrong without a word."""
     if len(result.cycles) != 1:
@@ -303,4 +328,12 @@ def _verdict(film: FilmTruth, result: FilmResult) -> str:
         return 'flagged'
     if not math.isfinite(film.beads):
         return 'WRONG: one restitution, unflagged'
-    return 'right' if cycle.restitution.lower <= film.beads <= cycle.restitution.upper else 'WRONG'
+    wrong = [
+        name
+        for name, found, true in (
+            ('beads', cycle.restitution, film.beads),
+            ('walls', cycle.wall_restitution, film.walls),
+        )
+        if not found.lower <= true <= found.upper
+    ]
+    return f'WRONG: {" and ".join(wrong)}' if wrong else 'right'

@@ -1,5 +1,6 @@
 """Films by other code, imported and analysed as a user does it: right, or flagged."""
 
+import numpy as np
 import pytest
 from shared_films import foreign_film
 
@@ -13,6 +14,12 @@ def measured(name):
     result = measure(film)
     assert result.refusal == ''
     return film, result
+
+
+def test_true_velocities_are_in_space_above_a_plate_that_swings():
+    film = read_truth(foreign_film('p3a'))
+    # Between two contacts a bead keeps its velocity; past the plate it would not.
+    assert np.median(np.abs(np.diff(film.velocities, axis=0))) == 0.0
 
 
 def within_three_sigma(interval, truth):

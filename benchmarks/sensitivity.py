@@ -1,0 +1,299 @@
+"""What each assumption does to the restitutions where it does not hold, and what is noticed.
+
+True tracks with the errors of tracking (`benchmarks.contacts`) and mean speeds with errors of 2 %,
+20 s from 10 mm/s, restitutions 0.89 and 0.97. The truth differs from what the stages are told in
+one thing at a time. A shift is that of the headline against the ideal cycles of the same seeds;
+the ideal row itself has errors against the truth.
+Tested by ``test/validation/test_sensitivity.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks import rough_gas as gas
+from benchmarks.accelerated_tray import AcceleratedTray
+from benchmarks.contacts import contacts_of, tracks_of
+from benchmarks.drag import FRAMES, estimate_of_tracks
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import Headline, PairCollision, Quality
+from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
+from nanorocks_ros.stages.scale.scale_check import ScaleCheck
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from benchmarks.contacts import Contacts
+    from nanorocks_ros.experiment.trays import Species, Tray
+    from nanorocks_ros.records import CorEstimate, Measured, Tracks
+    from nanorocks_ros.simulation.shaken_tray import Moment
+
+_TRAYS = (1, 3)
+_CYCLES = 20
+_SEED = 2028
+_TRUTH = {'restitution': gas.PAIRS, 'wall_restitution': gas.WALLS}
+# Standard errors by which a measured drag or friction is noticed.
+_NOTICED = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation:
+    """In what the truth differs from what the stages are told.
+
+    Parameters
+    ----------
+    name : str
+    height : float, [m]
+        Of the tray, added.
+    count : int
+        Beads of the first species, added; tracked as the others.
+    untracked : int
+        Beads of the first species, added; not tracked.
+    diameter : float
+        Factor on all diameters.
+    size_spread : float
+        Standard deviation of the diameters of each species, relative, beside what is told.
+    simulation : dict
+        Settings of the simulation.
+    acceleration : tuple of 3 floats, [m/s^2]
+        Of all beads.
+    scale : float
+        Factor on all lengths in the picture.
+    tilt : float, [rad]
+        Of the axis of the camera, towards the length of the tray.
+    """
+
+    name: str
+    height: float = 0.0
+    count: int = 0
+    untracked: int = 0
+    diameter: float = 1.0
+    size_spread: float = 0.0
+    simulation: dict[str, Any] = field(default_factory=dict)
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    scale: float = 1.0
+    tilt: float = 0.0
+
+
+def _rubbing(friction: float) -> dict[str, float]:
+    return gas.Roughness(tangential=0.4, friction=friction).settings
+
+
+IDEAL = Deviation(name='nothing: errors')
+DEVIATIONS = (
+    IDEAL,
+    Deviation(name='height +0.2 mm', height=2e-4),
+    Deviation(name='height -0.2 mm', height=-2e-4),
+    Deviation(name='a bead missing', count=-1),
+    Deviation(name='a bead too many, tracked', count=1),
+    Deviation(name='a bead too many, not tracked', untracked=1),
+    Deviation(name='diameters +2 %', diameter=1.02),
+    Deviation(name='diameters spread by 5 %', size_spread=0.05),
+    Deviation(
+        name='floor and lid lose twice as much',
+        simulation={'floor_lid_difference': gas.WALLS - 1.0},
+    ),
+    Deviation(name='drag 0.02 /s', simulation={'drag': 0.02}),
+    Deviation(name='friction 0.01', simulation=_rubbing(0.01)),
+    Deviation(name='friction 0.03', simulation=_rubbing(0.03)),
+    Deviation(name='acceleration 0.1 mm/s² in the picture', acceleration=(1e-4, 0.0, 0.0)),
+    Deviation(name='acceleration 1 mm/s² in the picture', acceleration=(1e-3, 0.0, 0.0)),
+    Deviation(name='acceleration 1 mm/s² along the view', acceleration=(0.0, 0.0, 1e-3)),
+    Deviation(name='camera tilted by 2°', tilt=math.radians(2.0)),
+    Deviation(name='image scale +1 %', scale=1.01),
+)
+
+
+def true_tray(told: Tray, deviation: Deviation) -> Tray:
+    """The tray that is simulated; untracked beads are its last species."""
+    species = [_true_species(kind, deviation) for kind in told.species]
+    first = species[0]
+    species[0] = replace(first, count=first.count + deviation.count)
+    if deviation.untracked:
+        species.append(replace(first, count=deviation.untracked))
+    length, width, height = told.dimensions
+    return replace(
+        told, species=tuple(species), dimensions=(length, width, height + deviation.height)
+    )
+
+
+def _true_species(told: Species, deviation: Deviation) -> Species:
+    """Diameters are uniform: half of their range is sqrt(3) standard deviations."""
+    half = 0.5 * deviation.diameter * (told.diameter_high - told.diameter_low)
+    spread = math.sqrt(3.0) * deviation.size_spread * deviation.diameter * told.diameter
+    wider = math.hypot(half, spread) - half
+    return replace(
+        told,
+        diameter_low=deviation.diameter * told.diameter_low - wider,
+        diameter_high=deviation.diameter * told.diameter_high + wider,
+    )
+
+
+class SeenTray:
+    """A tray as a camera sees it from far above whose scale or direction is not as told.
+
+    Parameters
+    ----------
+    beads : ShakenTray or AcceleratedTray
+    tray : Tray
+    deviation : Deviation
+    """
+
+    def __init__(
+        self, beads: ShakenTray | AcceleratedTray, tray: Tray, deviation: Deviation
+    ) -> None:
+        self._beads = beads
+        self._middle = 0.5 * np.array(tray.dimensions)
+        cosine, sine = math.cos(deviation.tilt), math.sin(deviation.tilt)
+        self._scale = deviation.scale
+        # To columns and rows of the picture, and depth.
+        self._view = deviation.scale * np.array(
+            [[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]
+        )
+
+    @property
+    def radii(self) -> NDArray[np.float64]:
+        """Radius of each bead in the picture, (n,), [m]."""
+        return self._scale * self._beads.radii
+
+    def moments(self, frames: int) -> Iterator[Moment]:
+        """Iterate over the frames; to be called once."""
+        for moment in self._beads.moments(frames):
+            yield replace(
+                moment,
+                positions=self._middle + (moment.positions - self._middle) @ self._view,
+                velocities=moment.velocities @ self._view,
+            )
+
+
+def tracks_of_cycle(told: Tray, deviation: Deviation, run: int) -> list[Tracks]:
+    """Tracks of a cycle by a tracker that never loses a bead, but those that are not tracked."""
+    tray = true_tray(told, deviation)
+    settings = _settings(told, deviation)
+    beads: ShakenTray | AcceleratedTray = ShakenTray(settings, tray, run)
+    if any(deviation.acceleration):
+        beads = AcceleratedTray(settings, tray, run, deviation.acceleration)
+    rng = np.random.default_rng([_SEED, run])
+    seen = SeenTray(beads, tray, deviation)
+    return [_as_told(tracks, told) for tracks in tracks_of(seen, tray, rng, FRAMES)]
+
+
+def _settings(told: Tray, deviation: Deviation):
+    return gas.settings_of(told, gas.SMOOTH, seed=_SEED, **deviation.simulation)
+
+
+def _as_told(tracks: Tracks, told: Tray) -> Tracks:
+    """Tracks of the species of the tray as it was told, with its number of beads."""
+    tracked = tracks.species < len(told.species)
+    names = (
+        'ids', 'species', 'positions', 'position_errors', 'velocities', 'velocity_errors',
+        'radii', 'radius_errors', 'seen',
+    )  # fmt: skip
+    return replace(
+        tracks,
+        **{name: getattr(tracks, name)[tracked] for name in names},
+        expected=np.array([species.count for species in told.species], dtype=np.int32),
+    )
+
+
+def cycle_of(told: Tray, deviation: Deviation, run: int) -> tuple[CorEstimate, Quality]:
+    """The final estimate of a cycle, and what the check of the image scale says of it."""
+    tracks = tracks_of_cycle(told, deviation, run)
+    contacts = contacts_of(told, iter(tracks))
+    estimate = estimate_of_tracks(told, _settings(told, deviation), run, tracks, contacts)
+    return estimate, _scale_flag(told, tracks, contacts)
+
+
+def _scale_flag(told: Tray, tracks: list[Tracks], contacts: Contacts) -> Quality:
+    check = ScaleCheck(PipelineSettings(), told)
+    for record in tracks:
+        check.push(record)
+    for contact in contacts:
+        if isinstance(contact, PairCollision):
+            check.push(contact)
+    check.flush()
+    return check.flag
+
+
+def report(cycles: int = _CYCLES) -> None:
+    """Print the table.
+
+    Parameters
+    ----------
+    cycles : int
+        In each row.
+    """
+    print(
+        '\n| tray | not as told | beads: shift | 95 % holds | half-width | walls: shift | 95 % '
+        'holds | half-width | collisions | contacts alone | inconsistent | accelerated | drag | '
+        'friction | scale |\n' + '| --- ' * 15 + '|'
+    )
+    for number in _TRAYS:
+        told = load_trays()[number]
+        # The ideal row has errors: what it is compared with is the truth.
+        unshifted = [_TRUTH] * cycles
+        for deviation in DEVIATIONS:
+            estimates, flags = zip(
+                *(cycle_of(told, deviation, run) for run in range(cycles)), strict=True
+            )
+            collisions = np.mean([estimate.collisions for estimate in estimates])
+            cells = [
+                *_shifts(estimates, unshifted),
+                f'{collisions:.0f}',
+                *_noticed(estimates, flags),
+            ]
+            print(f'| {number} | {deviation.name} | {" | ".join(cells)} |', flush=True)
+            if deviation == IDEAL:
+                unshifted = [
+                    {name: getattr(estimate, name).value for name in _TRUTH}
+                    for estimate in estimates
+                ]
+
+
+def _shifts(
+    estimates: tuple[CorEstimate, ...], unshifted: Sequence[dict[str, float]]
+) -> list[str]:
+    """Mean shift and its standard error, share of the intervals that hold, half-width.
+
+    Where some cycles have no result, the number of those that have one is added.
+    """
+    cells = []
+    for name, truth in _TRUTH.items():
+        pairs = [
+            (getattr(estimate, name), values[name])
+            for estimate, values in zip(estimates, unshifted, strict=True)
+        ]
+        known = [pair for pair in pairs if math.isfinite(pair[0].value - pair[1])]
+        shifts = [interval.value - value for interval, value in known]
+        error = np.std(shifts, ddof=1) / math.sqrt(len(shifts))
+        holds = np.mean([interval.lower <= truth <= interval.upper for interval, _ in known])
+        half = np.mean([0.5 * (interval.upper - interval.lower) for interval, _ in known])
+        shift = f'{np.mean(shifts):+.4f} ± {error:.4f}'
+        if len(known) < len(pairs):
+            shift += f' ({len(known)} of {len(pairs)})'
+        cells += [shift, f'{holds:.2f}', f'{half:.4f}']
+    return cells
+
+
+def _noticed(estimates: tuple[CorEstimate, ...], flags: tuple[Quality, ...]) -> list[str]:
+    """Shares of the cycles in which something is noticed."""
+    columns = (
+        [estimate.headline is Headline.CONTACTS for estimate in estimates],
+        [Quality.INCONSISTENT in estimate.quality for estimate in estimates],
+        [Quality.ACCELERATED in estimate.quality for estimate in estimates],
+        [_above_zero(estimate.drag) for estimate in estimates],
+        [_above_zero(estimate.wall_friction) for estimate in estimates],
+        [bool(flag) for flag in flags],
+    )
+    return [f'{np.mean(column):.2f}' for column in columns]
+
+
+def _above_zero(measured: Measured) -> bool:
+    return measured.value > _NOTICED * measured.error
