@@ -18,17 +18,16 @@ from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
-    FreeFlight,
-    Merge,
     Notice,
-    PairCollision,
     Quality,
-    Rebound,
     SpeedEstimate,
     Tracks,
 )
 from nanorocks_ros.settings import PipelineSettings, with_values
-from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
+from nanorocks_ros.stages.restitution.restitution_estimator import (
+    RestitutionEstimator,
+    RestitutionInput,
+)
 from nanorocks_ros.studies.analysis.bag_images import open_camera
 from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
 from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
@@ -174,7 +173,7 @@ class _Reading:
         estimator = RestitutionEstimator(settings, tray)
         estimates: list[CorEstimate] = []
         for record in self._records:
-            if isinstance(record, SpeedEstimate | Rebound | PairCollision | FreeFlight | Merge):
+            if isinstance(record, RestitutionInput):
                 estimates += estimator.push(record)
         return tuple(last_of_each_cycle([*estimates, *estimator.flush()]))
 

@@ -330,10 +330,10 @@ def _verdict(film: FilmTruth, result: FilmResult) -> str:
         return 'WRONG: one restitution, unflagged'
     wrong = [
         name
-        for name, found, true in (
+        for name, interval, true in (
             ('beads', cycle.restitution, film.beads),
             ('walls', cycle.wall_restitution, film.walls),
         )
-        if not found.lower <= true <= found.upper
+        if not interval.lower <= true <= interval.upper
     ]
     return f'WRONG: {" and ".join(wrong)}' if wrong else 'right'

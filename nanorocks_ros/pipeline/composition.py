@@ -16,19 +16,19 @@ from nanorocks_ros.records import (
     BodyEstimate,
     CorEstimate,
     Frame,
-    FreeFlight,
     Merge,
     MotionMask,
     Notice,
-    PairCollision,
-    Rebound,
     SpeedEstimate,
     Tracks,
     TrayImage,
 )
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
+from nanorocks_ros.stages.restitution.restitution_estimator import (
+    RestitutionEstimator,
+    RestitutionInput,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 Result = TrayImage | MotionMask | Tracks | Autocorrelation | ArrayRecord | Notice
-
-_OF_RESTITUTION = SpeedEstimate | Rebound | PairCollision | FreeFlight | Merge
 
 
 class Wanted(NamedTuple):
@@ -108,7 +106,7 @@ class TrayStages:
         records: list[TrayRecord | CorEstimate] = []
         for record in measured:
             records.append(record)
-            if isinstance(record, _OF_RESTITUTION):
+            if isinstance(record, RestitutionInput):
                 records += self.restitution.push(record)
             if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
                 self.clusters.push(record)

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import (
     BodyEstimate,
-    FreeFlight,
+    ContactOrFlight,
     Measured,
     Merge,
     MotionMask,
     Notice,
     PairCollision,
     Quality,
-    Rebound,
     SpeedEstimate,
     Tracks,
     TrayImage,
@@ -38,8 +37,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-Contact = Rebound | PairCollision | FreeFlight
-Event = Contact | BodyEstimate | Merge
+Event = ContactOrFlight | BodyEstimate | Merge
 TrayRecord = SpeedEstimate | MotionMask | Tracks | Event | Notice
 
 _LONG_DOUBT_NS = 1_000_000_000
@@ -192,7 +190,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             return []
         return self._in_cycle(self._contacts.push(tracks))
 
-    def _in_cycle(self, contacts: Iterable[Contact]) -> list[Event]:
+    def _in_cycle(self, contacts: Iterable[ContactOrFlight]) -> list[Event]:
         """The contacts with their cycle: some before a shaking event are known only after it."""
         cycle, start_ns = self._cycle
         return [

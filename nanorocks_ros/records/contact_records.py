@@ -175,3 +175,9 @@ class FreeFlight:
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+
+Contact = Rebound | PairCollision
+"""A contact of a bead, with a wall or with another bead."""
+ContactOrFlight = Contact | FreeFlight
+"""What the tracks of beads tell of the contacts and of the time between them."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-LOWEST_REBOUND = 0.5
+_LOWEST_REBOUND = 0.5
 """Lowest restitution of the walls for which rebounds are compared."""
 
 NO_SLOWING = Slowing.by_drag(Measured(0.0, 0.0))
@@ -33,7 +33,7 @@ NO_SLOWING = Slowing.by_drag(Measured(0.0, 0.0))
 # A single contact determines the bead restitution to 0.02 and the wall restitution to 0.003 at
 # best: a spline through these nodes represents sums of log likelihoods.
 _BEADS = np.linspace(0.0, 1.0, 101)
-_WALLS = np.linspace(LOWEST_REBOUND, 1.0, 501)
+_WALLS = np.linspace(_LOWEST_REBOUND, 1.0, 501)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -62,10 +62,6 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         slopes.append(0.5 * (high - low) * spread / UNITS[number])
     smooth_slopes = np.stack(slopes, axis=1)
     corners, shares = _corners(library, beads, walls)
-    rough = [
-        _rubbing(library, beads, walls, friction, settings.bead_friction_spread)
-        for friction in (FRICTIONS if library.rough else ())
-    ]
     return DecayTables(
         decays=library,
         restitution=restitution,
@@ -75,24 +71,23 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         corners=corners,
         shares=shares,
         rough=tuple(
-            RoughTables(
-                friction=friction,
-                mean=_smooth(rubbed),
-                slopes=_smooth(np.concatenate((smooth_slopes, by_beads), axis=1)),
+            _rough_tables(
+                library, beads, walls, friction, settings.bead_friction_spread, smooth_slopes
             )
-            for friction, (rubbed, by_beads) in zip(FRICTIONS, rough, strict=False)
+            for friction in (FRICTIONS if library.rough else ())
         ),
     )
 
 
-def _rubbing(
+def _rough_tables(
     library: DecayLibrary,
     beads: NDArray[np.float64],
     walls: NDArray[np.float64],
     friction: float,
     spread: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean ln f with a friction of walls and beads, and its change with that of beads alone."""
+    smooth_slopes: NDArray[np.float64],
+) -> RoughTables:
+    """Decays with a friction of walls and beads, and their change with that of beads alone."""
 
     def log_speed(beads_over_walls: float) -> NDArray[np.float64]:
         point = np.zeros((beads.size, len(FRICTION)))
@@ -100,7 +95,11 @@ def _rubbing(
         return library.log_speed(beads, walls, None, None, point)
 
     change = 0.5 * (log_speed(spread) - log_speed(-spread))
-    return log_speed(0.0), change[:, np.newaxis]
+    return RoughTables(
+        friction=friction,
+        mean=_smooth(log_speed(0.0)),
+        slopes=_smooth(np.concatenate((smooth_slopes, change[:, np.newaxis]), axis=1)),
+    )
 
 
 def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:

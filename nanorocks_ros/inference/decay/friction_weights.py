@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PriorSettings
 
 _FRICTION = HIGHEST_FRICTION * np.linspace(0.0, 1.0, 61) ** 2
-_FOUND, _ROLLING, _SHARES = (0.4, 0.8), 0.1, 14
+_SHARE_SHOWN, _ROLLING, _SHARES = (0.4, 0.8), 0.1, 14
 # Likelihoods of decays are smooth in ln(1 + friction / this).
 _SCALE = 0.01
 # Smallest half width of a prior, of the order of the grid.
@@ -89,7 +89,7 @@ def friction_weights(prior: PriorSettings, contacts: ContactTerms) -> FrictionWe
     prior_weight = _steps(_FRICTION) / (
         1.0 + ((_FRICTION - prior.friction) / max(prior.friction_error, _SHARPEST)) ** 2
     )
-    low, high = _FOUND
+    low, high = _SHARE_SHOWN
     shares = low + (high - low) * (np.arange(_SHARES) + 0.5) / _SHARES
     shown = shares * (_FRICTION / (1.0 + _FRICTION / _ROLLING))[:, np.newaxis]
     logs = np.zeros(shown.shape)

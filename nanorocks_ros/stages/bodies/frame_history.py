@@ -102,24 +102,24 @@ class FrameHistory:
             The beads of both bodies at a time. The search ends where they are one body, or single
             beads, whose own separation says when they met.
         """
-        found, misses = start, 0
+        earliest, misses = start, 0
         for frame in reversed(self._frames):
             if frame.time >= start:
                 continue
             if _may_touch(frame, *bodies(frame.time)):
-                found, misses = frame.time, 0
+                earliest, misses = frame.time, 0
             else:
                 misses += 1
             if misses > _MAX_MISSES:
                 break
-        return found
+        return earliest
 
 
-def _may_touch(frame: BodyFrame, one: frozenset[int], other: frozenset[int]) -> bool:
+def _may_touch(frame: BodyFrame, first_body: frozenset[int], second_body: frozenset[int]) -> bool:
     """Whether a visible bead of one body may touch one of another."""
-    if one == other or len(one) == len(other) == 1:
+    if first_body == second_body or len(first_body) == len(second_body) == 1:
         return False
-    first, second = (np.isin(frame.ids, list(body)) for body in (one, other))
+    first, second = (np.isin(frame.ids, list(body)) for body in (first_body, second_body))
     separations = frame.positions[first][:, np.newaxis] - frame.positions[second]
     reach = MAX_DISTANCE * (frame.radii[first][:, np.newaxis] + frame.radii[second])
     return bool((np.linalg.norm(separations, axis=-1) < reach).any())

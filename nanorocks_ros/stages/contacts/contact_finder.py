@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.records import FreeFlight, Measured, PairCollision, Rebound, Tracks
+from nanorocks_ros.records import (
+    Contact,
+    ContactOrFlight,
+    FreeFlight,
+    Measured,
+    PairCollision,
+    Rebound,
+    Tracks,
+)
 from nanorocks_ros.stages.contacts.flight_segments import FlightSegments, VelocityJump
 from nanorocks_ros.stages.contacts.line_fits import Intersection, intersect_lines
 from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_isolated_collision
@@ -39,13 +47,10 @@ _WALL_TOLERANCE = 0.15
 _MIN_DISTANCE, _MAX_DISTANCE = 0.9, 1.05
 # Tolerance of the time of a contact around its two frames, in intervals between frames.
 _TIME_TOLERANCE = 0.3
+_UNKNOWN_DRAG = Measured(0.0, 1.0)
 
 
-Found = Rebound | PairCollision | FreeFlight
-_NO_DRAG = Measured(0.0, 1.0)
-
-
-class ContactFinder(RestartingStage[Tracks, Found]):
+class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
     """Finds rebounds, collisions and the free flights between them in the tracks of one tray.
 
     A contact is complete when the flight after it ends, or is 48 positions long: at most 1.6 s
@@ -61,7 +66,7 @@ class ContactFinder(RestartingStage[Tracks, Found]):
 
     clock = Tracks
 
-    def __init__(self, tray: Tray, drag: Measured = _NO_DRAG) -> None:
+    def __init__(self, tray: Tray, drag: Measured = _UNKNOWN_DRAG) -> None:
         self._tray = tray
         self._prior = drag
         self.reset()
@@ -76,7 +81,7 @@ class ContactFinder(RestartingStage[Tracks, Found]):
         self._drag = RunningDrag(self._prior)
         self._segments.use_drag(self._drag.drag)
 
-    def _process(self, record: Tracks) -> tuple[Found, ...]:
+    def _process(self, record: Tracks) -> tuple[ContactOrFlight, ...]:
         """Add the tracks of a frame and return the contacts that are complete now."""
         if self._first_ns is None:
             self._first_ns = record.stamp_ns
@@ -101,7 +106,7 @@ class ContactFinder(RestartingStage[Tracks, Found]):
             for flight in self._segments.take_flights()
         ]
 
-    def flush(self) -> tuple[Found, ...]:
+    def flush(self) -> tuple[ContactOrFlight, ...]:
         """Give out the contacts that are held back, at the end of a recording.
 
         A contact is held back until the flight after it ends, or is 48 positions long. Here every
@@ -115,7 +120,7 @@ class ContactFinder(RestartingStage[Tracks, Found]):
     def _mass(self, jump: VelocityJump) -> float:
         return self._tray.species[jump.species].density * 4.0 / 3.0 * math.pi * jump.radius**3
 
-    def _contact_at(self, jump: VelocityJump) -> tuple[Rebound | PairCollision, ...]:
+    def _contact_at(self, jump: VelocityJump) -> tuple[Contact, ...]:
         crossing = Intersection(*intersect_lines(jump.lines[None]))
         if not (_are_straight(jump.lines) and self._is_between_frames(jump, crossing)):
             return ()
@@ -163,6 +168,7 @@ class ContactFinder(RestartingStage[Tracks, Found]):
         wall_motion, wall_error = self._history.velocity(crossing.time)
         incoming_error, outgoing_error = _velocity_errors(jump)
         before, after = jump.before.velocity, jump.after.velocity
+        drag_before, drag_after = self._drag_times(jump, crossing)
         rebound = Rebound(
             stamp_ns=self._stamp_ns(crossing.time),
             tray=self._tray.number,
@@ -177,8 +183,8 @@ class ContactFinder(RestartingStage[Tracks, Found]):
             wall_velocity=Measured(outward * float(wall_motion[axis]), wall_error),
             place=position,
             drag=self._segments.drag,
-            incoming_drag_time=self._drag_times(jump, crossing)[0],
-            outgoing_drag_time=self._drag_times(jump, crossing)[1],
+            incoming_drag_time=drag_before,
+            outgoing_drag_time=drag_after,
             friction_length=self._friction_length(jump, crossing.time),
         )
         signal = MIN_SIGNAL * math.hypot(incoming_error, wall_error)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from nanorocks_ros.records import Contact, ContactOrFlight
     from nanorocks_ros.settings import CoolingSettings
 
 # Between two cooling windows contacts come in that no fit uses.
@@ -50,15 +51,15 @@ class CycleContacts:
             FreeFlight: settings.rebounds or settings.collisions,
         }
         self._used = tuple(kind for kind, enabled in used.items() if enabled)
-        self._waiting: deque[Rebound | PairCollision | FreeFlight] = deque(maxlen=_MAX_WAITING)
+        self._waiting: deque[ContactOrFlight] = deque(maxlen=_MAX_WAITING)
         self._flights: list[FreeFlight] = []
         # Contacts whose speeds are in the terms, and those that wait for a drag.
-        self._counted: list[Rebound | PairCollision] = []
-        self._new: list[Rebound | PairCollision] = []
+        self._counted: list[Contact] = []
+        self._new: list[Contact] = []
         self._drag = 0.0
         self._terms = ContactTerms.of(())
 
-    def push(self, contact: Rebound | PairCollision | FreeFlight) -> None:
+    def push(self, contact: ContactOrFlight) -> None:
         """Add a contact or a flight; it may come before or after the speeds of that time."""
         if isinstance(contact, self._used):
             self._waiting.append(contact)
@@ -80,10 +81,12 @@ class CycleContacts:
         """
         end_ns = merge_ns - _MERGE_ERROR_NS
         self._flights = [flight for flight in self._flights if flight.stamp_ns < end_ns]
-        counted = self._counted + self._new
-        self._counted = []
-        self._new = [contact for contact in counted if contact.stamp_ns < end_ns]
-        self._terms = ContactTerms.of(())
+        self._new = [contact for contact in self._new if contact.stamp_ns < end_ns]
+        before = [contact for contact in self._counted if contact.stamp_ns < end_ns]
+        if len(before) < len(self._counted):
+            self._new = before + self._new
+            self._counted = []
+            self._terms = ContactTerms.of(())
 
     def next_cycle(self) -> None:
         """Clear the sums; late contacts of the cycle before are too early to be summed."""

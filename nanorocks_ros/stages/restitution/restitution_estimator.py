@@ -11,12 +11,11 @@ import numpy as np
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import (
     NS,
+    ContactOrFlight,
     CorEstimate,
     CorStatus,
-    FreeFlight,
     Measured,
     Merge,
-    PairCollision,
     Quality,
     Rebound,
     SpeedEstimate,
@@ -46,12 +45,11 @@ if TYPE_CHECKING:
 _STAMP_ROUNDING_NS = 1_000_000
 # The first speed may come that much later for other reasons than a tray that oscillates.
 _LATE_NS = 500_000_000
+RestitutionInput = SpeedEstimate | ContactOrFlight | Merge
+"""The records from which restitutions are estimated."""
 
 
-Input = SpeedEstimate | Rebound | PairCollision | FreeFlight | Merge
-
-
-class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
+class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
     """Estimates restitutions from the speeds and contacts of each cycle, and of all of them.
 
     While a cycle cools there is an estimate every `update_interval`. The last one of the cycle,
@@ -106,7 +104,7 @@ class RestitutionEstimator(RestartingStage[Input, CorEstimate]):
         """
         return self._method.mean_of(evidence)
 
-    def _process(self, record: Input) -> tuple[CorEstimate, ...]:
+    def _process(self, record: RestitutionInput) -> tuple[CorEstimate, ...]:
         if isinstance(record, SpeedEstimate):
             return self._push_speed(record)
         if isinstance(record, Merge):

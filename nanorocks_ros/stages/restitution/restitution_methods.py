@@ -213,7 +213,8 @@ class DecayLibraryMethod:
         """
         if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
-        losses = flight_losses(contacts.flights, self._drag_prior)
+        flights = contacts.flights
+        losses = flight_losses(flights, self._drag_prior)
         terms = contacts.terms(losses.drag.value)
         friction = friction_weights(self._prior, terms)
         likelihood = decay_likelihood(
@@ -252,9 +253,7 @@ class DecayLibraryMethod:
             # Rebounds determine the walls even where nothing is known of the beads.
             result = replace(result, wall_restitution=wall_restitution)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
-        own = CycleLikelihoods(
-            cycles=1, decay=likelihood, contacts=terms, flights=contacts.flights
-        )
+        own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=terms, flights=flights)
         mean, wall_mean = self._means(own, final=final, trusted=trusted and not accelerated)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
 
