@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks import rough_gas as gas
 from benchmarks.contacts import contacts_of, true_tracks
+from benchmarks.coverage import coverage
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod
 from nanorocks_ros.settings import CoolingSettings, PipelineSettings
@@ -129,12 +130,13 @@ def _cells(estimates: list[CorEstimate], ideal: list[float]) -> tuple[str, list[
     for k, (name, truth) in enumerate(
         zip(('restitution', 'wall_restitution'), _TRUTH, strict=True)
     ):
-        intervals = [getattr(estimate, name) for estimate in estimates]
-        known = [interval for interval in intervals if math.isfinite(interval.value)]
-        holds = np.mean([interval.lower <= truth <= interval.upper for interval in known])
-        half = float(np.mean([0.5 * (interval.upper - interval.lower) for interval in known]))
-        halves.append(half)
-        ratio = f'{half / ideal[k]:.2f}' if ideal else '1'
-        error = np.median([interval.value for interval in known]) - truth
-        cells += [f'{holds:.2f}', f'{half:.4f}', ratio, f'{error:+.4f}']
+        seen = coverage((getattr(estimate, name) for estimate in estimates), truth)
+        halves.append(seen.half_width)
+        ratio = f'{seen.half_width / ideal[k]:.2f}' if ideal else '1'
+        cells += [
+            f'{seen.holds:.2f}',
+            f'{seen.half_width:.4f}',
+            ratio,
+            f'{seen.median_error:+.4f}',
+        ]
     return ' | '.join(cells), halves

@@ -14,6 +14,7 @@ import numpy as np
 
 from benchmarks import rough_gas as gas
 from benchmarks.contacts import contacts_of, true_tracks
+from benchmarks.coverage import coverage
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_library_file import library_of
@@ -98,11 +99,8 @@ def _rows(
         intervals = [_intervals(cycle, source) for cycle in cycles]
         cells = []
         for true, column in zip(truth, zip(*intervals, strict=True), strict=True):
-            known = [interval for interval in column if math.isfinite(interval.value)]
-            holds = np.mean([interval.lower <= true <= interval.upper for interval in known])
-            half = np.mean([0.5 * (interval.upper - interval.lower) for interval in known])
-            error = np.median([interval.value for interval in known]) - true
-            cells += [f'{holds:.2f}', f'{half:.4f}', f'{error:+.4f}']
+            seen = coverage(column, true)
+            cells += [f'{seen.holds:.2f}', f'{seen.half_width:.4f}', f'{seen.median_error:+.4f}']
         print(f'| {name} | {friction:g} | {first} | {source} | {" | ".join(cells)} |', flush=True)
         name, first = '', ' | '
 

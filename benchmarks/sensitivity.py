@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks import rough_gas as gas
 from benchmarks.accelerated_tray import AcceleratedTray
 from benchmarks.contacts import contacts_of, tracks_of
+from benchmarks.coverage import coverage
 from benchmarks.drag import FRAMES, estimate_of_tracks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Headline, PairCollision, Quality
@@ -273,12 +274,11 @@ def _shifts(
         known = [pair for pair in pairs if math.isfinite(pair[0].value - pair[1])]
         shifts = [interval.value - value for interval, value in known]
         error = np.std(shifts, ddof=1) / math.sqrt(len(shifts))
-        holds = np.mean([interval.lower <= truth <= interval.upper for interval, _ in known])
-        half = np.mean([0.5 * (interval.upper - interval.lower) for interval, _ in known])
+        seen = coverage((interval for interval, _ in known), truth)
         shift = f'{np.mean(shifts):+.4f} ± {error:.4f}'
         if len(known) < len(pairs):
             shift += f' ({len(known)} of {len(pairs)})'
-        cells += [shift, f'{holds:.2f}', f'{half:.4f}']
+        cells += [shift, f'{seen.holds:.2f}', f'{seen.half_width:.4f}']
     return cells
 
 
