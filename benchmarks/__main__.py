@@ -48,6 +48,7 @@ ALL = (
     'rotation',
     'decay_libraries',
     'friction',
+    'friction_films',
     'drag',
     'sensitivity',
     'engine',

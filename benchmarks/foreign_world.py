@@ -1,41 +1,25 @@
 """Films of drawn cameras, drawn trays and other code: restitutions, speeds and counts in them.
 
-Drawn films: one tray in a video file, with light, lens, sensor, codec, scale and frame rate drawn
-(``--effects drawn``), and beads, walls, height, diameter, count and start drawn from the priors.
-The pipeline is told the tray's nominal values, the scale and where the floor is. Films by other
-code are read from the folder ``NANOROCKS_FOREIGN``, by default ``../shared/data/foreign``: videos
-with their truth in ``.npz`` files.
-
-Films and results are kept (`filmed_cycles.folder`), results under a key of the source code: an
-interrupted run goes on where it was. ``NANOROCKS_FILM_COUNT`` is the number of films a tray,
-50 by default.
+Drawn films (`drawn_films`): the pipeline is told the tray's nominal values, the scale and where
+the floor is. Films by other code are read from the folder ``NANOROCKS_FOREIGN``, by default
+``../shared/data/foreign``: videos with their truth in ``.npz`` files. ``NANOROCKS_FILM_COUNT`` is
+the number of films a tray, 50 by default.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
-import pickle
-from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.drawn import varied
-from benchmarks.film_measurement import DECADES, FilmResult, is_flagged, measure
-from benchmarks.film_truth import FilmTruth, read_truth
-from benchmarks.filmed_cycles import DRAWN_PAIRS, folder
-from nanorocks_ros.cli.progress import Progress
-from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.jobs.tasks import Workers, run_tasks
-from nanorocks_ros.outputs.atomic_files import write_bytes
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
+from benchmarks.film_measurement import DECADES, FilmResult, is_flagged
+from benchmarks.film_truth import FilmTruth
 from nanorocks_ros.records import CorStatus, Quality
-from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
-from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,41 +28,20 @@ if TYPE_CHECKING:
 
 FOREIGN = 'NANOROCKS_FOREIGN'
 """Environment variable with the folder of films made by other code."""
-COUNT = 'NANOROCKS_FILM_COUNT'
-"""Environment variable with the number of drawn films of each tray."""
-
 _TRAYS = (1, 3, 5, 7)
-_FILMS = 50
-_SHAKE = 1.0
-_SECONDS = 26.0
-# Mean speeds after the kick, drawn with uniform logarithm, [m/s].
-_SPEEDS = (6e-3, 14e-3)
 _HALF_WIDTHS = 3.0
 # Factor within which stated errors count as right.
 _FACTOR = 1.5
-# Part of the cameras that jitter or sway.
-_MOVING = 0.2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Read:
-    """A film and what was measured in it."""
-
-    film: FilmTruth
-    result: FilmResult
 
 
 def report() -> None:
     """Make missing films, measure in all, and print the tables."""
-    drawn = {f'tray_{tray}_{number}': (tray, number) for tray, number in _all_drawn()}
-    missing = {key: film for key, film in drawn.items() if not _video(*film)}
-    with Progress('drawing films') as progress:
-        run_tasks(_draw, missing, Workers(), progress.count)
-    read = _measured(films_drawn())
+    draw(_all_drawn())
+    read = measured(films_drawn())
     print_drawn(read)
     foreign = films_by_other_code()
     if foreign:
-        read_foreign = _measured(foreign)
+        read_foreign = measured(foreign)
         print_foreign(read_foreign)
         read += read_foreign
     else:
@@ -88,7 +51,7 @@ def report() -> None:
 
 def films_drawn() -> list[Path]:
     """The drawn films that exist."""
-    return [video for film in _all_drawn() if (video := _video(*film))]
+    return [video for film in _all_drawn() if (video := film.video)]
 
 
 def films_by_other_code() -> list[Path]:
@@ -97,82 +60,13 @@ def films_by_other_code() -> list[Path]:
     return sorted(Path(os.environ.get(FOREIGN, default)).glob('*.mp4'))
 
 
-def _all_drawn() -> list[tuple[int, int]]:
-    """Tray and number of each drawn film."""
-    numbers = range(int(os.environ.get(COUNT, _FILMS)))
-    return [(tray, number) for number in numbers for tray in _TRAYS]
-
-
-def _stem(tray: int, number: int) -> Path:
-    return folder() / 'drawn_cameras' / f'tray_{tray}_{number}'
-
-
-def _video(tray: int, number: int) -> Path | None:
-    """The film, if it exists with its truth."""
-    stem = _stem(tray, number)
-    videos = [stem.with_suffix(suffix) for suffix in ('.mp4', '.avi')]
-    there = [video for video in videos if video.exists()]
-    return there[0] if there and stem.with_suffix('.npz').exists() else None
-
-
-def _draw(film: tuple[int, int]) -> None:
-    """Draw the truth of a tray, and film it with a drawn camera."""
-    number_of_tray, number = film
-    prior = PriorSettings(min_wall_restitution=0.8)
-    random = np.random.default_rng([number, number_of_tray])
-    beads = random.uniform(*DRAWN_PAIRS)
-    walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
-    tray, values = varied(load_trays()[number_of_tray], walls, prior, random)
-    values |= {
-        'restitution': beads,
-        'wall_restitution': walls,
-        'mean_speed': math.exp(random.uniform(*np.log(_SPEEDS))),
-        'first_shake': _SHAKE,
-        'seed': 5000 + number,
-        'tray': number_of_tray,
-    }
-    simulation = with_values(SimulationSettings(), values, 'benchmark')
-    stem = _stem(number_of_tray, number)
-    stem.parent.mkdir(parents=True, exist_ok=True)
-    seed = 10 * number + number_of_tray
-    write_drawn_film(stem, tray, simulation, _SECONDS, seed, moving=_MOVING)
-
-
-def _measured(videos: list[Path]) -> list[_Read]:
-    """What is measured in each film; results of an earlier run of the same code are used."""
-    missing = {video.stem: video for video in videos if not _result_file(video).exists()}
-    with Progress('measuring in films') as progress:
-        run_tasks(_measure, missing, Workers(), progress.count)
+def _all_drawn() -> list[DrawnFilm]:
     return [
-        _Read(film=read_truth(video), result=pickle.loads(_result_file(video).read_bytes()))
-        for video in videos
+        DrawnFilm(tray=tray, number=number) for number in range(film_count()) for tray in _TRAYS
     ]
 
 
-def _measure(video: Path) -> None:
-    path = _result_file(video)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(path, pickle.dumps(measure(read_truth(video))))
-
-
-def _result_file(video: Path) -> Path:
-    return folder() / f'measured_{_code_key()}' / f'{video.stem}.pickle'
-
-
-@cache
-def _code_key() -> str:
-    """Key of the code that measures."""
-    here = Path(__file__).resolve().parent
-    files = sorted((here.parent / 'nanorocks_ros').rglob('*.py'))
-    names = ('film_measurement.py', 'film_truth.py', 'place_errors.py')
-    files += [here / name for name in names]
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def print_drawn(read: list[_Read]) -> None:
+def print_drawn(read: list[ReadFilm]) -> None:
     """Print what is measured in drawn films, tray by tray."""
     print('\nDrawn films: restitutions of the unflagged final estimates\n')
     print(
@@ -199,12 +93,8 @@ def print_drawn(read: list[_Read]) -> None:
         )
 
 
-def _restitution_row(tray: int, films: list[_Read]) -> str:
-    final = [
-        read_film
-        for read_film in films
-        if read_film.result.final and not is_flagged(read_film.result.final)
-    ]
+def _restitution_row(tray: int, films: list[ReadFilm]) -> str:
+    final = [film for film in films if film.is_unflagged]
     single = sum(len(read_film.result.cycles) == 1 for read_film in films)
     row = f'| {tray} | {len(films)} | {single} '
     row += f'| {len(final)} '
@@ -269,8 +159,8 @@ def _spread(values: NDArray[np.float64]) -> str:
     return f'{low:.3f} to {high:.3f}'
 
 
-def print_foreign(read: list[_Read]) -> None:
-    """Print what is measured in read_film film made by other code."""
+def print_foreign(read: list[ReadFilm]) -> None:
+    """Print what is measured in each film made by other code."""
     print('\nFilms by other code\n')
     print(
         '| film | truth: beads, walls | cycles | beads | walls | flags | speeds | counted '
@@ -301,7 +191,7 @@ def _foreign_row(film: FilmTruth, result: FilmResult) -> str:
     return row + f'| {_verdict(film, result)} |'
 
 
-def print_errors(read: list[_Read]) -> None:
+def print_errors(read: list[ReadFilm]) -> None:
     """Print stated errors of places and radii over the true ones, film by film."""
     print('\nErrors of places and radii, by species\n')
     print('| film | px/mm | true error [px] | between frames | stated / true | radii |')

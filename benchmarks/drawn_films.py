@@ -1,0 +1,169 @@
+"""Films of drawn trays by drawn cameras: made once, measured once for each state of the code.
+
+One tray in a video file, with light, lens, sensor, codec, scale and frame rate drawn
+(``--effects drawn``), and beads, walls, height, diameter, count and start drawn from the priors.
+A film with drag or friction has the tray and the camera of the film without.
+
+Films and results are kept (`filmed_cycles.folder`), results under a key of the source code: an
+interrupted run goes on where it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import pickle
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.drawn import varied
+from benchmarks.film_measurement import FilmResult, is_flagged, measure
+from benchmarks.film_truth import FilmTruth, read_truth
+from benchmarks.filmed_cycles import DRAWN_PAIRS, folder
+from benchmarks.rough_gas import SMOOTH, Roughness
+from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
+from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+COUNT = 'NANOROCKS_FILM_COUNT'
+"""Environment variable with the number of drawn films of each tray."""
+
+_FILMS = 50
+_SHAKE = 1.0
+_SECONDS = 26.0
+# Mean speeds after the kick, drawn with uniform logarithm, [m/s].
+_SPEEDS = (6e-3, 14e-3)
+# Part of the cameras that jitter or sway.
+_MOVING = 0.2
+_TANGENTIAL = 0.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnFilm:
+    """A film whose tray and camera are drawn.
+
+    Parameters
+    ----------
+    tray, number : int
+        What is drawn depends on these two alone.
+    drag : float, [1/s]
+    friction : float
+        Of beads, floor, lid and walls, with a tangential restitution of 0.4; 0 is smooth.
+    """
+
+    tray: int
+    number: int
+    drag: float = 0.0
+    friction: float = 0.0
+
+    @property
+    def stem(self) -> Path:
+        """The path of the film without its suffix; drag and friction in thousandths."""
+        physics = [
+            f'_{name}_{round(1e3 * value)}'
+            for name, value in (('drag', self.drag), ('friction', self.friction))
+            if value
+        ]
+        name = f'tray_{self.tray}_{self.number}{"".join(physics)}'
+        return folder() / 'drawn_cameras' / name
+
+    @property
+    def video(self) -> Path | None:
+        """The film, if it exists with its truth."""
+        videos = [self.stem.with_suffix(suffix) for suffix in ('.mp4', '.avi')]
+        there = [video for video in videos if video.exists()]
+        return there[0] if there and self.stem.with_suffix('.npz').exists() else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadFilm:
+    """A film and what was measured in it."""
+
+    film: FilmTruth
+    result: FilmResult
+
+    @property
+    def is_unflagged(self) -> bool:
+        """Whether there is one cycle with a final estimate that no flag warns of."""
+        return self.result.final is not None and not is_flagged(self.result.final)
+
+
+def film_count(default: int = _FILMS) -> int:
+    """How many films are drawn of each tray."""
+    return int(os.environ.get(COUNT, default))
+
+
+def draw(films: Iterable[DrawnFilm]) -> None:
+    """Make the films that do not exist."""
+    missing = {film.stem.name: film for film in films if not film.video}
+    with Progress('drawing films') as progress:
+        run_tasks(_draw, missing, Workers(), progress.count)
+
+
+def measured(videos: Sequence[Path]) -> list[ReadFilm]:
+    """What is measured in each film; results of an earlier run of the same code are used."""
+    missing = {video.stem: video for video in videos if not _result_file(video).exists()}
+    with Progress('measuring in films') as progress:
+        run_tasks(_measure, missing, Workers(), progress.count)
+    return [
+        ReadFilm(film=read_truth(video), result=pickle.loads(_result_file(video).read_bytes()))
+        for video in videos
+    ]
+
+
+def _draw(film: DrawnFilm) -> None:
+    """Draw the truth of a tray, and film it with a drawn camera."""
+    prior = PriorSettings(min_wall_restitution=0.8)
+    random = np.random.default_rng([film.number, film.tray])
+    beads = random.uniform(*DRAWN_PAIRS)
+    walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
+    tray, values = varied(load_trays()[film.tray], walls, prior, random)
+    rough = Roughness(tangential=_TANGENTIAL, friction=film.friction) if film.friction else SMOOTH
+    values |= {
+        'restitution': beads,
+        'wall_restitution': walls,
+        'mean_speed': math.exp(random.uniform(*np.log(_SPEEDS))),
+        'first_shake': _SHAKE,
+        'seed': 5000 + film.number,
+        'tray': film.tray,
+        'drag': film.drag,
+        **rough.settings,
+    }
+    simulation = with_values(SimulationSettings(), values, 'benchmark')
+    film.stem.parent.mkdir(parents=True, exist_ok=True)
+    seed = 10 * film.number + film.tray
+    write_drawn_film(film.stem, tray, simulation, _SECONDS, seed, moving=_MOVING)
+
+
+def _measure(video: Path) -> None:
+    path = _result_file(video)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, pickle.dumps(measure(read_truth(video))))
+
+
+def _result_file(video: Path) -> Path:
+    return folder() / f'measured_{_code_key()}' / f'{video.stem}.pickle'
+
+
+@cache
+def _code_key() -> str:
+    """Key of the code that measures."""
+    here = Path(__file__).resolve().parent
+    files = sorted((here.parent / 'nanorocks_ros').rglob('*.py'))
+    names = ('film_measurement.py', 'film_truth.py', 'place_errors.py')
+    files += [here / name for name in names]
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]

@@ -1,0 +1,92 @@
+"""Films of gases with drag and friction: restitutions, their intervals and the drag.
+
+Films of trays and cameras that are drawn (`drawn_films`), each with and without drag and friction;
+``NANOROCKS_FILM_COUNT`` is the number of films a row, 40 by default. The intervals are those of
+all final headlines of beads, and of walls, whether or not a flag warns of them; "unflagged" is the
+share without. "Over ideal" is the median over films of the half-width over that of the same film
+without drag and friction.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from benchmarks.coverage import coverage
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
+from nanorocks_ros.records import Interval
+
+_TRAYS = (1, 3)
+# Drag and friction of each row; the first is the ideal one.
+_ROWS = (
+    (0.0, 0.0),
+    *((drag, 0.0) for drag in (0.005, 0.02, 0.07)),
+    *((0.0, friction) for friction in (0.01, 0.03, 0.1)),
+    *((0.02, friction) for friction in (0.01, 0.03)),
+)
+_FILMS = 40
+_NAMES = ('restitution', 'wall_restitution')
+
+
+def report() -> None:
+    """Make missing films, measure in all, and print the table."""
+    films = {
+        (tray, *row): [
+            DrawnFilm(tray=tray, number=number, drag=row[0], friction=row[1])
+            for number in range(film_count(_FILMS))
+        ]
+        for row in _ROWS
+        for tray in _TRAYS
+    }
+    draw([film for same in zip(*films.values(), strict=True) for film in same])
+    print(
+        '\n| tray | drag [1/s] | friction | drag found - true, sd of a film | final | unflagged | '
+        'beads: holds | half-width | over ideal | median error | walls: holds | half-width | '
+        'over ideal | median error |\n' + '| --- ' * 14 + '|'
+    )
+    for tray in _TRAYS:
+        ideal: list[ReadFilm] = []
+        for drag, friction in _ROWS:
+            videos = [film.video for film in films[tray, drag, friction]]
+            read = measured([video for video in videos if video])
+            ideal = ideal or read
+            print(
+                f'| {tray} | {drag:g} | {friction:g} | {_cells(read, ideal, drag)} |', flush=True
+            )
+
+
+def _cells(read: list[ReadFilm], ideal: list[ReadFilm], drag: float) -> str:
+    """All cells but those of the case."""
+    estimates = [film.result.final for film in read if film.result.final]
+    drags = np.array([estimate.drag.value - drag for estimate in estimates])
+    cells = [
+        f'{np.nanmean(drags):+.4f}, {np.nanstd(drags):.4f}',
+        f'{len(estimates)}/{len(read)}',
+        f'{np.mean([film.is_unflagged for film in read]):.2f}',
+    ]
+    for name, truth in zip(_NAMES, ('beads', 'walls'), strict=True):
+        errors = [_error(film, name, getattr(film.film, truth)) for film in read]
+        seen = coverage(errors, 0.0)
+        ratios = [
+            _half_width(film, name) / _half_width(same, name)
+            for film, same in zip(read, ideal, strict=True)
+        ]
+        cells += [f'{seen.holds:.2f}', f'{seen.half_width:.4f}', f'{np.nanmedian(ratios):.2f}']
+        cells.append(f'{seen.median_error:+.4f}')
+    return ' | '.join(cells)
+
+
+def _error(film: ReadFilm, name: str, truth: float) -> Interval:
+    """A final restitution less the true one; NaN where there is none."""
+    if film.result.final is None:
+        return Interval()
+    measured_interval: Interval = getattr(film.result.final, name)
+    limits = (measured_interval.value, measured_interval.lower, measured_interval.upper)
+    return Interval(*(limit - truth for limit in limits))
+
+
+def _half_width(film: ReadFilm, name: str) -> float:
+    interval = _error(film, name, 0.0)
+    known = math.isfinite(interval.value)
+    return 0.5 * (interval.upper - interval.lower) if known else math.nan
