@@ -180,6 +180,8 @@ class ContactFinder(RestartingStage[Tracks, Found]):
             incoming_drag_time=self._drag_times(jump, crossing)[0],
             outgoing_drag_time=self._drag_times(jump, crossing)[1],
             friction_length=self._friction_length(jump, crossing.time),
+            temperature=self._history.temperature(crossing.time, jump.species),
+            free_height=max(self._tray.dimensions[2] - 2.0 * jump.radius, 0.0),
         )
         signal = MIN_SIGNAL * math.hypot(incoming_error, wall_error)
         return (
