@@ -14,7 +14,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
 
 from nanorocks_ros.inference.contacts.contact_likelihood import ERROR_SCALES, OUTLIERS, marginal
 from nanorocks_ros.inference.contacts.projected_collisions import RANGE
@@ -34,8 +33,9 @@ COLUMNS = 12
 
 # Change of the vertical speed at a hit over the speed before it: 1 and a restitution.
 _CHANGE = 1.95
-# Equally likely vertical speeds, and times of a hit.
-_SPEEDS, _PHASES = 6, 6
+# Vertical speeds, in steps of a part of their root mean square, and equally likely times of a hit.
+_SPEEDS, _STEP, _PHASES = 10, 0.3, 6
+_GOLDEN = 0.618034
 # Restitutions of a likelihood, and frictions between which it is interpolated.
 _WALLS = np.linspace(0.5, 1.0, 251)
 _FRICTIONS = np.array([0.0, 0.004, 0.008, 0.015, 0.025, 0.04, 0.065, 0.1, 0.15])
@@ -138,18 +138,13 @@ def rubbed_table(
     scales = np.array(ERROR_SCALES)
     table = np.zeros((frictions.size, drags.size, scales.size, grid.size))
     for row in columns:
-        _add_rebound(row, grid, (frictions, drags, scales), _VERTICAL, table)
+        _add_rebound(row, grid, (frictions, drags, scales), table)
     return table
 
 
-def _vertical_speeds() -> NDArray[np.float64]:
-    """Means of equally likely parts of the size of a Gaussian of unit variance."""
-    edges = stats.norm.ppf(0.5 + 0.5 * np.linspace(0.0, 1.0, _SPEEDS + 1))
-    density = stats.norm.pdf(edges)
-    return np.asarray(2.0 * _SPEEDS * (density[:-1] - density[1:]))
-
-
-_VERTICAL = _vertical_speeds()
+_VERTICAL = _STEP * (np.arange(_SPEEDS) + 0.5)
+_SHARES = np.exp(-0.5 * _VERTICAL**2)
+_SHARES /= _SHARES.sum() * _PHASES
 
 
 @compiled
@@ -157,18 +152,17 @@ def _add_rebound(
     row: NDArray[np.float64],
     grid: NDArray[np.float64],
     axes: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    vertical: NDArray[np.float64],
     table: NDArray[np.float64],
 ) -> None:
     """Add the log likelihood of a rebound to the table of `rubbed_table`."""
     frictions, drags, scales = axes
-    remains, weights = np.empty(vertical.size * _PHASES + 1), np.empty(vertical.size * _PHASES + 1)
+    remains, weights = np.empty(_SPEEDS * _PHASES + 1), np.empty(_SPEEDS * _PHASES + 1)
     errors, density = np.empty(grid.size), np.empty((scales.size, grid.size))
     for n in range(grid.size):
         own, wall = grid[n] * row[2], (1.0 + grid[n]) * row[4]
         errors[n] = math.sqrt(own * own + row[3] * row[3] + wall * wall)
     for i in range(frictions.size):
-        nodes = _remaining_speeds(row, _CHANGE * frictions[i], vertical, remains, weights)
+        nodes = _remaining_speeds(row, _CHANGE * frictions[i], remains, weights)
         for j in range(drags.size):
             before = row[0] * math.exp((row[11] - drags[j]) * row[9])
             after = row[1] * math.exp((drags[j] - row[11]) * row[10])
@@ -211,7 +205,6 @@ def _add_density(
 def _remaining_speeds(
     row: NDArray[np.float64],
     friction: float,
-    vertical: NDArray[np.float64],
     remains: NDArray[np.float64],
     weights: NDArray[np.float64],
 ) -> int:
@@ -221,19 +214,20 @@ def _remaining_speeds(
     first, 1, stands for all cases without a hit.
     """
     remains[0], weights[0], nodes = 1.0, 0.0, 1
-    for speed in vertical:
+    for k in range(_SPEEDS):
+        speed = _VERTICAL[k]
         for phase in range(_PHASES):
-            first = (phase + 0.5) / _PHASES
+            # Shifted from speed to speed, so that few losses are alike.
+            first = (phase + (_GOLDEN * (k + 1)) % 1.0) / _PHASES
             hits = _hits(first / speed, 1.0 / speed, row[7])
             part = max(1.0 - friction * speed * row[5] * hits, 0.0)
             hits = _hits((1.0 - first) / speed, 1.0 / speed, row[8])
-            part *= max(1.0 - friction * speed * row[6] * hits, 0.0)
+            part /= 1.0 + friction * speed * row[6] * hits
             if part == 1.0:
-                weights[0] += 1.0
+                weights[0] += _SHARES[k]
             elif part > 0.0:
-                remains[nodes], weights[nodes] = part, 1.0
+                remains[nodes], weights[nodes] = part, _SHARES[k]
                 nodes += 1
-    weights[:nodes] /= vertical.size * _PHASES
     return nodes
 
 

@@ -40,6 +40,15 @@ def test_a_known_drag_gives_the_speeds_at_the_contact():
     assert _restitution(rebound) == pytest.approx(RESTITUTION, abs=0.004)
 
 
+def test_a_rebound_tells_how_often_floor_and_lid_are_hit():
+    (rebound,) = _found(Rebound, Measured(0.0, 0.0))
+    assert rebound.free_height == pytest.approx(TRAY.dimensions[2] - TRAY.diameter)
+    speed = 0.5 * (rebound.incoming.value + rebound.outgoing.value)
+    time = rebound.incoming_drag_time + rebound.outgoing_drag_time
+    by_length = rebound.friction_length * speed / time
+    assert rebound.temperature == pytest.approx(by_length, rel=0.02)
+
+
 def test_a_drag_that_is_known_later_corrects_the_same():
     (rebound,) = _found(Rebound, Measured(0.0, 0.0))
     times = rebound.incoming_drag_time + rebound.outgoing_drag_time
