@@ -57,7 +57,8 @@ def rebound_columns(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
 def _row(rebound: Rebound) -> tuple[float, ...]:
     before = math.hypot(rebound.incoming.value, rebound.tangential_incoming)
     after = math.hypot(rebound.outgoing.value, rebound.tangential_outgoing)
-    vertical = math.sqrt(rebound.temperature)
+    # No temperature where no speed was known.
+    vertical = math.sqrt(rebound.temperature) if rebound.temperature > 0.0 else 0.0
     drag_time = rebound.incoming_drag_time + rebound.outgoing_drag_time
     hits = 0.0
     if vertical * rebound.free_height * drag_time > 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -101,8 +102,11 @@ def test_a_known_friction_is_surer_than_an_unknown_one():
     assert known[2] - known[0] < unknown[2] - unknown[0]
 
 
-def test_beads_that_meet_no_floor_lose_nothing():
-    rebounds = [replace(rebound, free_height=0.0) for rebound in _rebounds(2, 20, 0.0)]
+@pytest.mark.parametrize(
+    'unknown', [{'free_height': 0.0}, {'temperature': math.nan, 'friction_length': math.nan}]
+)
+def test_beads_that_meet_no_floor_or_of_unknown_speeds_lose_nothing(unknown):
+    rebounds = [replace(rebound, **unknown) for rebound in _rebounds(2, 20, 0.0)]
     np.testing.assert_allclose(
         _quantiles(rebounds, _only(0.1)), _quantiles(rebounds, _only(0.0)), atol=1e-9
     )
