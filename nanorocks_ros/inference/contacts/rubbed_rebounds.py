@@ -36,6 +36,8 @@ _CHANGE = 1.95
 # Vertical speeds, in steps of a part of their root mean square, and equally likely times of a hit.
 _SPEEDS, _STEP, _PHASES = 10, 0.3, 6
 _GOLDEN = 0.618034
+# Parts of a speed are alike within this, in errors of the speed after; and the least that is left.
+_ALIKE, _LEAST = 0.25, 0.01
 # Restitutions of a likelihood, and frictions between which it is interpolated.
 _WALLS = np.linspace(0.5, 1.0, 251)
 _FRICTIONS = np.array([0.0, 0.004, 0.008, 0.015, 0.025, 0.04, 0.065, 0.1, 0.15])
@@ -157,7 +159,7 @@ def _add_rebound(
 ) -> None:
     """Add the log likelihood of a rebound to the table of `rubbed_table`."""
     frictions, drags, scales = axes
-    remains, weights = np.empty(_SPEEDS * _PHASES + 1), np.empty(_SPEEDS * _PHASES + 1)
+    remains, weights = np.empty(_SPEEDS * _PHASES), np.empty(_SPEEDS * _PHASES)
     errors, density = np.empty(grid.size), np.empty((scales.size, grid.size))
     for n in range(grid.size):
         own, wall = grid[n] * row[2], (1.0 + grid[n]) * row[4]
@@ -189,17 +191,15 @@ def _add_density(
 ) -> None:
     """Add the density of a speed after a rebound, given that before and what hits left of it."""
     before, after = speeds
-    # Errors rise with the restitution.
-    reach = _FARTHEST * scales[-1] * errors[-1]
-    first = np.searchsorted(grid, (after - reach) / before)
-    last = np.searchsorted(grid, (after + reach) / before)
-    for n in range(first, last):
-        off = (after - grid[n] * before) / errors[n]
-        for k in range(scales.size):
-            scaled = off / scales[k]
-            if -_FARTHEST < scaled < _FARTHEST:
-                height = weight / (_SQRT_2_PI * scales[k] * errors[n])
-                density[k, n] += height * math.exp(-0.5 * scaled * scaled)
+    for k in range(scales.size):
+        # Errors rise with the restitution.
+        reach = _FARTHEST * scales[k] * errors[-1]
+        first = np.searchsorted(grid, (after - reach) / before)
+        last = np.searchsorted(grid, (after + reach) / before)
+        for n in range(first, last):
+            error = scales[k] * errors[n]
+            off = (after - grid[n] * before) / error
+            density[k, n] += weight / (_SQRT_2_PI * error) * math.exp(-0.5 * off * off)
 
 
 @compiled
@@ -211,24 +211,26 @@ def _remaining_speeds(
 ) -> int:
     """Write the parts of a speed that hits beside a rebound leave, and their probabilities.
 
-    `friction` is what a hit takes off, over the vertical speed. Returns the number of parts; the
-    first, 1, stands for all cases without a hit.
+    `friction` is what a hit takes off, over the vertical speed. Returns the number of parts; parts
+    that differ by much less than the errors are one.
     """
-    remains[0], weights[0], nodes = 1.0, 0.0, 1
+    alike, nodes = _ALIKE * row[3] / row[1], 0
     for k in range(_SPEEDS):
         speed = _VERTICAL[k]
         for phase in range(_PHASES):
             # Shifted from speed to speed, so that few losses are alike.
             first = (phase + (_GOLDEN * (k + 1)) % 1.0) / _PHASES
             hits = _hits(first / speed, 1.0 / speed, row[7])
-            part = max(1.0 - friction * speed * row[5] * hits, 0.0)
+            part = max(1.0 - friction * speed * row[5] * hits, _LEAST)
             hits = _hits((1.0 - first) / speed, 1.0 / speed, row[8])
             part /= 1.0 + friction * speed * row[6] * hits
-            if part == 1.0:
-                weights[0] += _SHARES[k]
-            elif part > 0.0:
-                remains[nodes], weights[nodes] = part, _SHARES[k]
-                nodes += 1
+            node = 0
+            while node < nodes and abs(part - remains[node]) > alike:
+                node += 1
+            if node == nodes:
+                remains[node], weights[node], nodes = part, 0.0, nodes + 1
+            weights[node] += _SHARES[k]
+            remains[node] += (part - remains[node]) * _SHARES[k] / weights[node]
     return nodes
 
 
