@@ -128,6 +128,7 @@ class CycleLikelihoods:
                     friction=arrays['contacts.friction'],
                     rebound_losses=arrays['contacts.rebound_losses'],
                     collision_losses=arrays['contacts.collision_losses'],
+                    rubbed=arrays['contacts.rubbed'],
                 ),
                 flights=arrays['flights'],
                 by_form=by_form,

@@ -7,12 +7,13 @@ contradict it, or show that walls rub, only the contacts are believed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_terms import NO_SLOWING
+from nanorocks_ros.inference.decay.friction_weights import friction_weights
 from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.records import (
@@ -30,8 +31,12 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
     from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
-    from nanorocks_ros.inference.likelihood_1d import Posterior1D
+    from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
     from nanorocks_ros.settings import PriorSettings
+
+# Where contacts are believed alone walls rub: the prior of their friction, whose error is that of
+# walls that hardly do, is wider by this. By default 0.03 is then half as likely as 0.
+_WIDER = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +145,7 @@ def restitution_sources(
     if headline is Headline.CONTACTS:
         slowing = losses.rubbed if losses else NO_SLOWING
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-        wall_likelihood = contacts.wall_likelihood(prior.rebound_bias, slowing)
+        wall_likelihood = _with_friction(contacts, prior, slowing)
     return RestitutionSources(
         joint=joint,
         decay=posterior_of(tables, log_likelihood, walls) if number else joint,
@@ -149,6 +154,19 @@ def restitution_sources(
         wall_friction=friction,
         headline=headline,
         drag=slowing.drag if losses else UNKNOWN_MEASURED,
+    )
+
+
+def _with_friction(
+    contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
+) -> Likelihood1D | None:
+    """Log likelihood of the wall restitution where floor and lid rub as the walls do."""
+    wide = replace(prior, friction_error=_WIDER * prior.friction_error)
+    weights = friction_weights(wide, contacts)
+    if weights is None:
+        return contacts.wall_likelihood(prior.rebound_bias, slowing)
+    return contacts.rubbed_wall_likelihood(
+        prior.rebound_bias, slowing.drag, (weights.friction, weights.weight)
     )
 
 

@@ -49,6 +49,10 @@ class Rebound:
         Time from the middle of one flight to that of the other, times the temperature of the
         species, over the speed of the bead: what friction of floor and lid takes off beside the
         contact, over the friction rate.
+    temperature : float, [m^2/s^2]
+        Of the species at that time: mean square of a horizontal component.
+    free_height : float, [m]
+        Height of the tray less the diameter of the bead: its way from floor to lid.
     """
 
     stamp_ns: int
@@ -68,6 +72,8 @@ class Rebound:
     incoming_drag_time: float = 0.0
     outgoing_drag_time: float = 0.0
     friction_length: float = 0.0
+    temperature: float = 0.0
+    free_height: float = 0.0
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

@@ -10,6 +10,7 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import marginal, pair_table, rebound_table
 from nanorocks_ros.inference.contacts.dragged_contacts import loss_beside_contacts, loss_sums
+from nanorocks_ros.inference.contacts.rubbed_rebounds import rebound_columns, rubbed_likelihood
 from nanorocks_ros.inference.contacts.wall_friction import (
     friction_likelihood,
     friction_table,
@@ -51,6 +52,8 @@ class ContactTerms:
         Table of `friction_table`.
     rebound_losses, collision_losses : ndarray (4,)
         Sums of `loss_sums`.
+    rubbed : ndarray (n, 12)
+        Of `rebound_columns`, for what floor and lid take off.
     """
 
     rebounds: int
@@ -60,6 +63,7 @@ class ContactTerms:
     friction: NDArray[np.float64]
     rebound_losses: NDArray[np.float64]
     collision_losses: NDArray[np.float64]
+    rubbed: NDArray[np.float64]
 
     @classmethod
     def of(cls, contacts: Iterable[Rebound | PairCollision]) -> ContactTerms:
@@ -75,6 +79,7 @@ class ContactTerms:
             friction=friction_table(rebounds),
             rebound_losses=loss_sums(rebounds),
             collision_losses=loss_sums(collisions),
+            rubbed=rebound_columns(rebounds),
         )
 
     def __add__(self, other: ContactTerms) -> ContactTerms:
@@ -86,6 +91,7 @@ class ContactTerms:
             friction=self.friction + other.friction,
             rebound_losses=self.rebound_losses + other.rebound_losses,
             collision_losses=self.collision_losses + other.collision_losses,
+            rubbed=np.concatenate([self.rubbed, other.rubbed]),
         )
 
     @property
@@ -114,6 +120,27 @@ class ContactTerms:
             return None
         term = Likelihood1D(restitution=_WALLS, log_likelihood=marginal(self.walls))
         return _slowed(term, loss_beside_contacts(self.rebound_losses, slowing), bias)
+
+    def rubbed_wall_likelihood(
+        self,
+        bias: float,
+        drag: Measured,
+        friction: tuple[NDArray[np.float64], NDArray[np.float64]],
+    ) -> Likelihood1D | None:
+        """Log likelihood of the wall restitution where floor and lid may rub.
+
+        Parameters
+        ----------
+        bias : float
+            As of `wall_likelihood`.
+        drag : Measured, [1/s]
+            Of the gas.
+        friction : tuple of 2 ndarrays (n,)
+            Frictions of floor and lid, and their probabilities.
+        """
+        if not self.rebounds:
+            return None
+        return rubbed_likelihood(self.rubbed, drag, friction).convolved(bias)
 
     def bead_likelihood(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING

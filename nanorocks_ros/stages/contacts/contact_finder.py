@@ -186,6 +186,8 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
             incoming_drag_time=drag_before,
             outgoing_drag_time=drag_after,
             friction_length=self._friction_length(jump, crossing.time),
+            temperature=self._history.temperature(crossing.time, jump.species),
+            free_height=max(self._tray.dimensions[2] - 2.0 * jump.radius, 0.0),
         )
         signal = MIN_SIGNAL * math.hypot(incoming_error, wall_error)
         return (

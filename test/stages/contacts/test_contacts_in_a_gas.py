@@ -40,6 +40,20 @@ def test_a_known_drag_gives_the_speeds_at_the_contact():
     assert _restitution(rebound) == pytest.approx(RESTITUTION, abs=0.004)
 
 
+def test_a_rebound_tells_how_often_floor_and_lid_are_hit():
+    velocities = np.tile([SPEED, 0.0], (TIMES.size, 1, 1))
+    positions = bounced(TIMES, SPEED, RESTITUTION, at=AT)
+    finder = ContactFinder(TRAY, Measured(0.0, 0.0))
+    for record in tracks_of(positions, velocities=velocities):
+        finder.push(record)
+    (rebound,) = (result for result in finder.flush() if isinstance(result, Rebound))
+    assert rebound.free_height == pytest.approx(TRAY.dimensions[2] - 2e-3)
+    assert rebound.temperature == pytest.approx(0.5 * SPEED**2)
+    speed = 0.5 * (rebound.incoming.value + rebound.outgoing.value)
+    time = rebound.incoming_drag_time + rebound.outgoing_drag_time
+    assert rebound.friction_length * speed == pytest.approx(time * rebound.temperature)
+
+
 def test_a_drag_that_is_known_later_corrects_the_same():
     (rebound,) = _found(Rebound, Measured(0.0, 0.0))
     times = rebound.incoming_drag_time + rebound.outgoing_drag_time

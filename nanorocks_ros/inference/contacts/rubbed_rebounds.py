@@ -1,0 +1,249 @@
+"""Likelihood of the wall restitution where floor and lid rub: losses of single rebounds.
+
+A bead that bounces between floor and lid hits them unseen beside a rebound, too. Each hit takes
+friction times the change of the vertical speed off the speed along them, so that a rebound loses
+nothing, or one or more such steps: the scatter of rebounds is one-sided. Vertical speeds are taken
+to be Gaussian, with the mean square of a horizontal component; the time of a hit is uniform.
+
+Tested by ``test/inference/contacts/test_rubbed_rebounds.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.inference.contacts.contact_likelihood import ERROR_SCALES, OUTLIERS, marginal
+from nanorocks_ros.inference.contacts.projected_collisions import RANGE
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.log_sums import log_sum
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.records import Measured, Rebound
+
+COLUMNS = 12
+"""Numbers that are kept of a rebound."""
+
+# Change of the vertical speed at a hit over the speed before it: 1 and a restitution.
+_CHANGE = 1.95
+# Vertical speeds, in steps of a part of their root mean square, and equally likely times of a hit.
+_SPEEDS, _STEP, _PHASES = 10, 0.3, 6
+_GOLDEN = 0.618034
+# Parts of a speed are alike within this, in errors of the speed after; and the least that is left.
+_ALIKE, _LEAST = 0.25, 0.01
+# Restitutions of a likelihood, and frictions between which it is interpolated.
+_WALLS = np.linspace(0.5, 1.0, 251)
+_FRICTIONS = np.array([0.0, 0.004, 0.008, 0.015, 0.025, 0.04, 0.065, 0.1, 0.15])
+# Errors of equally likely drags from their mean.
+_DRAGS = math.sqrt(1.5) * np.array([-1.0, 0.0, 1.0])
+# Frictions less probable than this, over the largest probability, are left out.
+_UNLIKELY = 1e-6
+# Errors beyond which a Gaussian is 0.
+_FARTHEST = 6.0
+_SQRT_2_PI = math.sqrt(2.0 * math.pi)
+
+
+def rebound_columns(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
+    """What `rubbed_table` needs of rebounds, (n, 12); those of more rebounds are concatenated."""
+    rows = [_row(rebound) for rebound in rebounds]
+    return np.array(rows, dtype=np.float64).reshape(-1, COLUMNS)
+
+
+def _row(rebound: Rebound) -> tuple[float, ...]:
+    before = math.hypot(rebound.incoming.value, rebound.tangential_incoming)
+    after = math.hypot(rebound.outgoing.value, rebound.tangential_outgoing)
+    # No temperature where no speed was known.
+    vertical = math.sqrt(rebound.temperature) if rebound.temperature > 0.0 else 0.0
+    drag_time = rebound.incoming_drag_time + rebound.outgoing_drag_time
+    hits = 0.0
+    if vertical * rebound.free_height * drag_time > 0.0:
+        time = rebound.friction_length * 0.5 * (before + after) / rebound.temperature
+        # In both flights, each twice as long as from its middle to the contact.
+        hits = 2.0 * time * vertical / rebound.free_height
+        hits /= drag_time
+    return (
+        rebound.incoming.value,
+        rebound.outgoing.value,
+        rebound.incoming.error,
+        rebound.outgoing.error,
+        rebound.wall_velocity.error,
+        vertical / before,
+        vertical / after if after > 0.0 else 0.0,
+        hits * rebound.incoming_drag_time,
+        hits * rebound.outgoing_drag_time,
+        rebound.incoming_drag_time,
+        rebound.outgoing_drag_time,
+        rebound.drag,
+    )
+
+
+def rubbed_likelihood(
+    columns: NDArray[np.float64],
+    drag: Measured,
+    friction: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> Likelihood1D:
+    """Log likelihood of rebounds, with friction, drag and the scale of errors integrated over.
+
+    Parameters
+    ----------
+    columns : ndarray (n, 12)
+        From `rebound_columns`.
+    drag : Measured, [1/s]
+        Of the gas, for the first species; where it is not below 0 its true value is not, either.
+    friction : tuple of 2 ndarrays (n,)
+        Frictions of floor and lid, and their probabilities.
+    """
+    drags = drag.value + drag.error * _DRAGS
+    if drag.value >= 0.0:
+        drags = np.maximum(drags, 0.0)
+    places = np.interp(friction[0], _FRICTIONS, np.arange(_FRICTIONS.size))
+    below = np.minimum(places.astype(int), _FRICTIONS.size - 2)
+    weights = np.bincount(below, friction[1] * (1.0 + below - places), _FRICTIONS.size)
+    weights += np.bincount(below + 1, friction[1] * (places - below), _FRICTIONS.size)
+    likely = weights > _UNLIKELY * weights.max()
+    table = rubbed_table(columns, _WALLS, _FRICTIONS[likely], drags)
+    by_friction = [marginal(rows.reshape(-1, _WALLS.size)) for rows in table]
+    logs = log_sum(np.array(by_friction), weights[likely])
+    return Likelihood1D(restitution=_WALLS, log_likelihood=logs)
+
+
+def rubbed_table(
+    columns: NDArray[np.float64],
+    grid: NDArray[np.float64],
+    frictions: NDArray[np.float64],
+    drags: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Log likelihood of rebounds for each friction, drag, scale of errors and restitution.
+
+    Parameters
+    ----------
+    columns : ndarray (n, 12)
+        From `rebound_columns`.
+    grid : ndarray (n_grid,)
+        Restitutions of the side walls, rising.
+    frictions : ndarray (n_frictions,)
+        Coefficients of friction of floor and lid.
+    drags : ndarray (n_drags,), [1/s]
+        Of the gas, for the first species.
+
+    Returns
+    -------
+    ndarray (n_frictions, n_drags, n_scales, n_grid)
+        Up to a constant; 0 without rebounds.
+    """
+    scales = np.array(ERROR_SCALES)
+    table = np.zeros((frictions.size, drags.size, scales.size, grid.size))
+    for row in columns:
+        _add_rebound(row, grid, (frictions, drags, scales), table)
+    return table
+
+
+_VERTICAL = _STEP * (np.arange(_SPEEDS) + 0.5)
+_SHARES = np.exp(-0.5 * _VERTICAL**2)
+_SHARES /= _SHARES.sum() * _PHASES
+
+
+@compiled
+def _add_rebound(
+    row: NDArray[np.float64],
+    grid: NDArray[np.float64],
+    axes: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    table: NDArray[np.float64],
+) -> None:
+    """Add the log likelihood of a rebound to the table of `rubbed_table`."""
+    frictions, drags, scales = axes
+    remains, weights = np.empty(_SPEEDS * _PHASES), np.empty(_SPEEDS * _PHASES)
+    errors, density = np.empty(grid.size), np.empty((scales.size, grid.size))
+    for n in range(grid.size):
+        own, wall = grid[n] * row[2], (1.0 + grid[n]) * row[4]
+        errors[n] = math.sqrt(own * own + row[3] * row[3] + wall * wall)
+    for i in range(frictions.size):
+        nodes = _remaining_speeds(row, _CHANGE * frictions[i], remains, weights)
+        for j in range(drags.size):
+            before = row[0] * math.exp((row[11] - drags[j]) * row[9])
+            after = row[1] * math.exp((drags[j] - row[11]) * row[10])
+            density[:] = OUTLIERS / (RANGE * row[0])
+            for node in range(nodes):
+                speeds = before * remains[node], after
+                _add_density(
+                    speeds, (1.0 - OUTLIERS) * weights[node], grid, errors, scales, density
+                )
+            for k in range(scales.size):
+                for n in range(grid.size):
+                    table[i, j, k, n] += math.log(density[k, n])
+
+
+@compiled
+def _add_density(
+    speeds: tuple[float, float],
+    weight: float,
+    grid: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    density: NDArray[np.float64],
+) -> None:
+    """Add the density of a speed after a rebound, given that before and what hits left of it."""
+    before, after = speeds
+    for k in range(scales.size):
+        # Errors rise with the restitution.
+        reach = _FARTHEST * scales[k] * errors[-1]
+        first = np.searchsorted(grid, (after - reach) / before)
+        last = np.searchsorted(grid, (after + reach) / before)
+        for n in range(first, last):
+            error = scales[k] * errors[n]
+            off = (after - grid[n] * before) / error
+            density[k, n] += weight / (_SQRT_2_PI * error) * math.exp(-0.5 * off * off)
+
+
+@compiled
+def _remaining_speeds(
+    row: NDArray[np.float64],
+    friction: float,
+    remains: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> int:
+    """Write the parts of a speed that hits beside a rebound leave, and their probabilities.
+
+    `friction` is what a hit takes off, over the vertical speed. Returns the number of parts; parts
+    that differ by much less than the errors are one.
+    """
+    alike, nodes = _ALIKE * row[3] / row[1], 0
+    for k in range(_SPEEDS):
+        speed = _VERTICAL[k]
+        for phase in range(_PHASES):
+            # Shifted from speed to speed, so that few losses are alike.
+            first = (phase + (_GOLDEN * (k + 1)) % 1.0) / _PHASES
+            hits = _hits(first / speed, 1.0 / speed, row[7])
+            part = max(1.0 - friction * speed * row[5] * hits, _LEAST)
+            hits = _hits((1.0 - first) / speed, 1.0 / speed, row[8])
+            part /= 1.0 + friction * speed * row[6] * hits
+            node = 0
+            while node < nodes and abs(part - remains[node]) > alike:
+                node += 1
+            if node == nodes:
+                remains[node], weights[node], nodes = part, 0.0, nodes + 1
+            weights[node] += _SHARES[k]
+            remains[node] += (part - remains[node]) * _SHARES[k] / weights[node]
+    return nodes
+
+
+@compiled
+def _hits(first: float, spacing: float, end: float) -> float:
+    """Sum of the effects of hits, at even distances from a rebound, on the slope of a flight.
+
+    A hit beside the rebound changes the line through the flight like its speed at the rebound, one
+    at the far end does not change it.
+    """
+    total, place = 0.0, first
+    while place < end:
+        x = place / end
+        total += 1.0 - x * x * (3.0 - 2.0 * x)
+        place += spacing
+    return total
