@@ -128,6 +128,8 @@ class CycleLikelihoods:
                     friction=arrays['contacts.friction'],
                     rebound_losses=arrays['contacts.rebound_losses'],
                     collision_losses=arrays['contacts.collision_losses'],
+                    rebound_impacts=arrays['contacts.rebound_impacts'],
+                    collision_impacts=arrays['contacts.collision_impacts'],
                 ),
                 flights=arrays['flights'],
                 by_form=by_form,
