@@ -22,6 +22,7 @@ from nanorocks_ros.inference.contacts.projected_collisions import RANGE
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.numerics.log_sums import log_sum
+from nanorocks_ros.records import Interval
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,8 +35,6 @@ MIN_CONTACTS = 20
 EXPONENTS = np.linspace(-1.0, 2.0, 31)
 """Exponents that are compared; all are equally likely."""
 
-# Share of gases of constant restitution in which chance shows a dependence.
-_FALSE_ALARMS = 0.05
 # Exponents for the search of the likely restitutions, how often and in how many steps the range is
 # narrowed, and to which depth of the log likelihood. With 1 nothing would depend on speed.
 _FEW, _ROUNDS, _STEPS, _DEPTH = np.array([-0.4, 0.0, 0.4, 0.8]), 4, 16, 12.0
@@ -65,18 +64,17 @@ class RestitutionExponent:
     restitution: float
     exponent: Posterior1D
 
+    def interval(self, ends: NDArray[np.float64]) -> Interval:
+        """The exponent; `ends` are the probabilities of lower end, value and upper end."""
+        lower, value, upper = self.exponent.quantiles(ends).tolist()
+        return Interval(value, lower, upper)
+
     @property
     def chance(self) -> float:
         """Probability that a constant restitution shows an exponent at least as far from 0."""
         axis = self.exponent.restitution
         below = float(self.exponent.probability[axis < 0.0].sum())
         return 2.0 * min(below, 1.0 - below)
-
-
-def depends_on_speed(*exponents: RestitutionExponent | None) -> bool:
-    """Whether any kind of contacts shows a dependence; wrong in 5 % of constant gases."""
-    known = [exponent for exponent in exponents if exponent]
-    return any(exponent.chance < _FALSE_ALARMS / len(known) for exponent in known)
 
 
 def wall_exponent(
@@ -284,4 +282,4 @@ def _between(rows: NDArray[np.float64], i: int, first: int, place: float) -> flo
         rows[i, first + node],
         rows[i, first + node + 1],
     )
-    return middle + part * (0.5 * (high - low) + 0.5 * part * (high - 2.0 * middle + low))
+    return float(middle + part * (0.5 * (high - low) + 0.5 * part * (high - 2.0 * middle + low)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -251,7 +251,7 @@ class CollisionRules:
 
     def _walls(self) -> tuple[int, _OfWalls, float, float]:
         """Kind, restitution or argument of each wall, inverse of the speed, and exponent."""
-        given = self.wall_restitution
+        given: Any = self.wall_restitution
         laws = _speed_laws(given)
         if laws:
             kinds, arguments, per_speeds, exponents = zip(

@@ -1,0 +1,73 @@
+"""Whether the restitutions of a tray depend on the impact speed, by its contacts.
+
+Tested by ``test/inference/test_speed_dependence.py``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from nanorocks_ros.inference.flights.flight_losses import Slowing
+from nanorocks_ros.records.headlines import walls_rub
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+    from nanorocks_ros.inference.contacts.restitution_exponent import RestitutionExponent
+    from nanorocks_ros.inference.flights.flight_losses import FlightLosses
+    from nanorocks_ros.settings import PriorSettings
+
+# Largest chance of an exponent by which a restitution depends on speed. Each kind of contacts is
+# tested, and errors of rebounds are stated too large: 5 % of gases of constant restitution have a
+# smaller one in either (`python -m benchmarks speed_dependence`).
+_MAX_CHANCE = 0.04
+
+
+class SpeedDependence(NamedTuple):
+    """How the restitutions of beads and of walls depend on speed; None from too few contacts."""
+
+    beads: RestitutionExponent | None = None
+    walls: RestitutionExponent | None = None
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether any kind of contacts shows a dependence; wrong in 5 % of constant gases."""
+        return any(kind is not None and kind.chance < _MAX_CHANCE for kind in self)
+
+    def fields(self, ends: NDArray[np.float64]) -> dict[str, Any]:
+        """The fields of `CycleRestitution` and `MeanRestitution` that say so.
+
+        Parameters
+        ----------
+        ends : ndarray (3,)
+            Probabilities of lower end, value and upper end.
+        """
+        fields: dict[str, Any] = {'speed_dependent': self.is_seen}
+        for prefix, kind in (('', self.beads), ('wall_', self.walls)):
+            if kind:
+                fields[f'{prefix}restitution_exponent'] = kind.interval(ends)
+                fields[f'{prefix}impact_speed'] = kind.speed
+        return fields
+
+
+def speed_dependence(
+    contacts: ContactTerms, losses: FlightLosses, prior: PriorSettings
+) -> SpeedDependence:
+    """Compare contacts at different speeds.
+
+    Parameters
+    ----------
+    contacts : ContactTerms
+    losses : FlightLosses
+        What slows beads between contacts; by friction only where walls rub.
+    prior : PriorSettings
+        Its systematic errors of contacts may be this much more for each factor e in speed.
+    """
+    rubbed = walls_rub(contacts.wall_friction)
+    slowing = losses.rubbed if rubbed else Slowing.by_drag(losses.drag)
+    return SpeedDependence(
+        beads=contacts.bead_exponent(prior.collision_bias, slowing),
+        walls=contacts.wall_exponent(prior.rebound_bias, slowing),
+    )
