@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # tested, and errors of rebounds are stated too large: 5 % of gases of constant restitution have a
 # smaller one in either (`python -m benchmarks speed_dependence`).
 _MAX_CHANCE = 0.04
+# Of the contacts of an estimate before.
+_MORE = 1.1
 
 
 class SpeedDependence(NamedTuple):
@@ -71,3 +73,30 @@ def speed_dependence(
         beads=contacts.bead_exponent(prior.collision_bias, slowing),
         walls=contacts.wall_exponent(prior.rebound_bias, slowing),
     )
+
+
+class RunningDependence:
+    """The dependence while a cycle cools: compared anew where there are a tenth more contacts."""
+
+    def __init__(self) -> None:
+        self._contacts = 0
+        self._last = SpeedDependence()
+
+    def of(
+        self, contacts: ContactTerms, losses: FlightLosses, prior: PriorSettings, *, final: bool
+    ) -> SpeedDependence:
+        """The dependence by the contacts so far, or of a moment ago.
+
+        Parameters
+        ----------
+        contacts : ContactTerms
+        losses : FlightLosses
+        prior : PriorSettings
+        final : bool
+            By all contacts of the cycle; the next one is another cycle.
+        """
+        number = contacts.rebounds + contacts.collisions
+        if final or not self._contacts <= number < _MORE * self._contacts:
+            self._contacts = number
+            self._last = speed_dependence(contacts, losses, prior)
+        return self._last

@@ -27,7 +27,7 @@ from nanorocks_ros.inference.restitution_sources import (
     intervals_of,
     restitution_sources,
 )
-from nanorocks_ros.inference.speed_dependence import speed_dependence
+from nanorocks_ros.inference.speed_dependence import RunningDependence, speed_dependence
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED,
@@ -201,6 +201,7 @@ class DecayLibraryMethod:
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self._probability = settings.cooling.probability
         self._include_inconsistent = settings.cooling.include_inconsistent
+        self._dependence = RunningDependence()
         self.evidence: CycleLikelihoods | None = None
         self._means_so_far = UNKNOWN_MEASURED, UNKNOWN_MEASURED
 
@@ -228,7 +229,7 @@ class DecayLibraryMethod:
         )
         integrated = likelihood.integrated(friction)
         accelerated = losses.is_accelerated and self._drives(losses, decay)
-        dependence = speed_dependence(terms, losses, self._prior)
+        dependence = self._dependence.of(terms, losses, self._prior, final=final)
         decays = 0 if accelerated or dependence.is_seen else 1
         sources = self._sources(integrated, terms, losses, decays=decays)
         best = int(np.argmax(integrated))
