@@ -49,6 +49,7 @@ ALL = (
     'decay_libraries',
     'friction',
     'drag',
+    'speed_dependence',
     'sensitivity',
     'engine',
     'engine_physics',

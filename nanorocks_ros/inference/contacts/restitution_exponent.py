@@ -42,6 +42,9 @@ _MAX_RESTITUTION = 0.999
 # In films the speed after a contact came out this much too low, [m/s], whoever made them: contacts
 # of less than 0.6 mm/s read 0.01 to 0.02 low, others hardly. In true tracks it is 0.
 _SLOW_LOSS = Measured(4e-6, 4e-6)
+# Exponents of simulated cycles by collisions scatter so much more than each collision by itself
+# says: radii and vertical speeds are common to them.
+_COLLISION_SCATTER = 1.15
 # 1 + restitution of two beads, for the reference speed.
 _MEAN_GAIN = 1.85
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
@@ -168,7 +171,8 @@ class _Collisions:
         restitutions: NDArray[np.float64],
         exponents: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        return _collision_logs(self.rows, kept, reference, restitutions, exponents)
+        logs = _collision_logs(self.rows, kept, reference, restitutions, exponents)
+        return logs / _COLLISION_SCATTER**2
 
 
 def _exponent(impacts: _Impacts, slowing: Slowing, bias: float) -> RestitutionExponent | None:
