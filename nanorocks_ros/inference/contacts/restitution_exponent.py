@@ -44,7 +44,7 @@ _MAX_RESTITUTION = 0.999
 _SLOW_LOSS = Measured(4e-6, 4e-6)
 # Exponents of simulated cycles by collisions scatter so much more than each collision by itself
 # says: radii and vertical speeds are common to them.
-_COLLISION_SCATTER = 1.15
+_COLLISION_SCATTER = 1.3
 # 1 + restitution of two beads, for the reference speed.
 _MEAN_GAIN = 1.85
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
