@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PriorSettings
 
 # Largest chance of an exponent by which a restitution depends on speed. Each kind of contacts is
-# tested, and errors of rebounds are stated too large: 5 % of gases of constant restitution have a
+# tested, but intervals are rather too wide: at most 5 % of gases of constant restitution have a
 # smaller one in either (`python -m benchmarks speed_dependence`).
-_MAX_CHANCE = 0.04
+_MAX_CHANCE = 0.05
 # Of the contacts of an estimate before.
 _MORE = 1.1
 

@@ -30,7 +30,7 @@ _LEAST_ERROR = 0.01
 # Flights that are bent by hits of floor and lid are partly left out, so that the friction rate
 # comes out too low: loss beside simulated rebounds, from their true speeds, over that by the rate,
 # and its relative spread over trays 1 and 3, frictions of 0.01 and 0.03, drags of 0 and 0.02 /s.
-FRICTION_FACTOR, _FRICTION_SPREAD = 1.15, 0.3
+FRICTION_FACTOR, FRICTION_SPREAD = 1.15, 0.3
 
 
 def dragged(contact: Rebound | PairCollision, drag: float) -> Rebound | PairCollision:
@@ -104,5 +104,5 @@ def loss_beside_contacts(sums: NDArray[np.float64], slowing: Slowing) -> Measure
         return Measured(0.0, 0.0)
     reach = np.array([time, FRICTION_FACTOR * length]) / weight
     by_friction = max(float(slowing.values[1] * reach[1]), 0.0)
-    variance = float(reach @ slowing.covariance @ reach) + (_FRICTION_SPREAD * by_friction) ** 2
+    variance = float(reach @ slowing.covariance @ reach) + (FRICTION_SPREAD * by_friction) ** 2
     return Measured(float(slowing.values @ reach) - taken_out / weight, math.sqrt(variance))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import OUTLIERS
-from nanorocks_ros.inference.contacts.dragged_contacts import FRICTION_FACTOR
+from nanorocks_ros.inference.contacts.dragged_contacts import FRICTION_FACTOR, FRICTION_SPREAD
 from nanorocks_ros.inference.contacts.impact_tables import LOSS_COLUMNS, NODES
 from nanorocks_ros.inference.contacts.projected_collisions import RANGE
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
@@ -219,6 +219,7 @@ def _kept(impacts: _Impacts, slowing: Slowing) -> NDArray[np.float64]:
     reach = np.column_stack([time, FRICTION_FACTOR * length, 1.0 / impacts.speeds])
     covariance = np.zeros((3, 3))
     covariance[:2, :2], covariance[2, 2] = slowing.covariance, _SLOW_LOSS.error**2
+    covariance[1, 1] += (FRICTION_SPREAD * slowing.values[1]) ** 2
     squares, axes = np.linalg.eigh(covariance)
     known = squares > 0.0
     steps = np.sqrt(known.sum() * squares[known])[:, np.newaxis] * axes.T[known]
