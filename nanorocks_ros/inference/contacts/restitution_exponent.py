@@ -45,8 +45,8 @@ _SLOW_LOSS = Measured(4e-6, 4e-6)
 # Exponents of simulated cycles by collisions scatter so much more than each collision by itself
 # says: radii and vertical speeds are common to them.
 _COLLISION_SCATTER = 1.3
-# Part of what friction takes off beside contacts that may go with the logarithm of speed: beads roll
-# and rub at each other. With a friction of 0.03 exponents come out 0.1 too high.
+# Part of what friction takes off beside contacts that may go with the logarithm of speed: beads
+# roll and rub at each other. With a friction of 0.03 exponents come out 0.1 too high.
 _RUBBING_ERROR = 0.5
 # 1 + restitution of two beads, for the reference speed.
 _MEAN_GAIN = 1.85
