@@ -281,7 +281,7 @@ def _collision_logs(
                 loss = min(unit * powers[i], 1.0)
                 change = exponents[k] * (loss - mean) / (2.0 - 0.5 * (loss + mean))
                 loss = min(unit * powers[i] * (1.0 + change + 0.5 * change * change), 1.0)
-                place = kept[i] * (1.0 - loss) * (NODES - 1)
+                place = min(kept[i] * (1.0 - loss), 1.0) * (NODES - 1)
                 level = _between(rows, i, LOSS_COLUMNS + 1, place)
                 slope = _between(rows, i, LOSS_COLUMNS + 1 + NODES, place)
                 table[r, k] += level + exponents[k] * loss * slope
