@@ -50,6 +50,7 @@ ALL = (
     'friction',
     'friction_films',
     'drag',
+    'speed_dependence',
     'sensitivity',
     'engine',
     'engine_physics',

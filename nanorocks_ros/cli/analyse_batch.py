@@ -171,7 +171,7 @@ def _print(batch: Batch, combined_results: Combined, prior: PriorSettings) -> No
 
 
 def _tray_lines(tray: TrayMeans) -> list[str]:
-    from nanorocks_ros.records import headline_in_words
+    from nanorocks_ros.records import Quality, headline_in_words
     from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
     values = means_as_json(tray)
@@ -186,10 +186,21 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
         count = values['cycles_read']
         lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
+        flags = Quality.SPEED_DEPENDENT if restitution.speed_dependent else Quality(0)
         source = headline_in_words(
-            restitution.headline, restitution.tension, restitution.wall_friction
+            restitution.headline, restitution.tension, restitution.wall_friction, flags
         )
         lines.append(f'from {source}')
+        if restitution.speed_dependent:
+            lines += [
+                f'exponent of 1 - restitution of {kind}: {text(name, 1.0, 2)} at '
+                f'{1e3 * speed:.2f} mm/s'
+                for kind, name, speed in (
+                    ('beads', 'restitution_exponent', restitution.impact_speed),
+                    ('walls', 'wall_restitution_exponent', restitution.wall_impact_speed),
+                )
+                if values[name] is not None
+            ]
     if tray.left_out:
         lines.append(
             f'the decays of {counted(tray.left_out, "cycle")} left out of the restitutions, since '

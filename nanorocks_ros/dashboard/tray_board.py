@@ -259,9 +259,7 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
         elements['reason'] = reason.text
     if isinstance(record, CorEstimate) and record.headline is Headline.CONTACTS:
         elements['headline_reason'] = reason_for_contacts(
-            record.tension,
-            record.wall_friction,
-            accelerated=Quality.ACCELERATED in record.quality,
+            record.tension, record.wall_friction, record.quality
         )
     return elements
 

@@ -16,9 +16,11 @@ from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
 from nanorocks_ros.inference.flights.flight_losses import flight_table
 from nanorocks_ros.records import (
     UNKNOWN,
+    UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
     UNKNOWN_MEASURED_INTERVAL,
     Headline,
+    Interval,
     Measured,
     MeasuredInterval,
 )
@@ -129,6 +131,8 @@ class CycleLikelihoods:
                     rebound_losses=arrays['contacts.rebound_losses'],
                     collision_losses=arrays['contacts.collision_losses'],
                     rubbed=arrays['contacts.rubbed'],
+                    rebound_impacts=arrays['contacts.rebound_impacts'],
+                    collision_impacts=arrays['contacts.collision_impacts'],
                 ),
                 flights=arrays['flights'],
                 by_form=by_form,
@@ -186,6 +190,10 @@ class MeanRestitution:
         Source of both restitutions, as of a cycle.
     wall_friction : Measured
     drag : Measured, [1/s]
+    restitution_exponent, wall_restitution_exponent : Interval
+    impact_speed, wall_impact_speed : float, [m/s]
+    speed_dependent : bool
+        Whether an exponent is not 0.
     """
 
     cycles: int
@@ -198,3 +206,8 @@ class MeanRestitution:
     headline: Headline = Headline.UNKNOWN
     wall_friction: Measured = UNKNOWN_MEASURED
     drag: Measured = UNKNOWN_MEASURED
+    restitution_exponent: Interval = UNKNOWN_INTERVAL
+    wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
+    impact_speed: float = UNKNOWN
+    wall_impact_speed: float = UNKNOWN
+    speed_dependent: bool = False

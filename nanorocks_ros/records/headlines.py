@@ -8,6 +8,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.records.quality_flags import NOTHING_WRONG, Quality
+
 if TYPE_CHECKING:
     from nanorocks_ros.records.values import Measured
 
@@ -16,6 +18,12 @@ AGREEMENT_TENSION = 2.45
 5 % are above, since its square is the chi square of two restitutions that both determine."""
 FRICTION_SIGMAS = 1.645
 """Standard deviations above 0 at which walls have friction: 5 % of smooth walls are above."""
+
+# Flags with which the decay does not count.
+_FLAGGED = {
+    Quality.ACCELERATED: 'an acceleration drives the beads',
+    Quality.SPEED_DEPENDENT: 'the restitution depends on the impact speed',
+}
 
 
 class Headline(IntEnum):
@@ -57,9 +65,11 @@ def headline_of(contacts: int, tension: float, friction: Measured) -> Headline:
     return Headline.CONTACTS if is_tense(tension) or walls_rub(friction) else Headline.JOINT
 
 
-def reason_for_contacts(tension: float, friction: Measured, *, accelerated: bool = False) -> str:
+def reason_for_contacts(
+    tension: float, friction: Measured, quality: Quality = NOTHING_WRONG
+) -> str:
     """Why a restitution is that of contacts alone; empty where the decay agrees."""
-    reasons = ['an acceleration drives the beads'] if accelerated else []
+    reasons = [text for flag, text in _FLAGGED.items() if flag in quality]
     if is_tense(tension):
         reasons.append(f'decay and contacts differ by {tension:.1f} standard deviations')
     if walls_rub(friction):
@@ -71,14 +81,14 @@ def reason_for_contacts(tension: float, friction: Measured, *, accelerated: bool
 
 
 def headline_in_words(
-    headline: Headline, tension: float, friction: Measured, *, accelerated: bool = False
+    headline: Headline, tension: float, friction: Measured, quality: Quality = NOTHING_WRONG
 ) -> str:
     """The source of a restitution in a phrase, with the reason where it is not all there is."""
     match headline:
         case Headline.JOINT:
             return 'decay and contacts together'
         case Headline.CONTACTS:
-            reason = reason_for_contacts(tension, friction, accelerated=accelerated)
+            reason = reason_for_contacts(tension, friction, quality)
             return 'contacts alone' + (f', since {reason}' if reason else '')
         case Headline.DECAY:
             return 'decay alone'

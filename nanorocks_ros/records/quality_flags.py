@@ -83,6 +83,7 @@ class Quality(IntFlag):
     INCONSISTENT = 2048
     DOUBTFUL_SCALE = 4096
     ACCELERATED = 8192
+    SPEED_DEPENDENT = 16384
 
     def names(self) -> list[str]:
         """Names of the flags that are set, in lower case."""

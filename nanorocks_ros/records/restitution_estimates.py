@@ -93,6 +93,11 @@ class CorEstimate:
     acceleration : MeasuredInterval, [m/s^2]
         Size of the acceleration that all beads have in common, in the image plane, with its
         limits.
+    restitution_exponent, wall_restitution_exponent : Interval, -1 to 2
+        Power of the impact speed with which 1 - restitution goes, of beads and of side walls, from
+        their contacts; 0 where the restitution is constant.
+    impact_speed, wall_impact_speed : float, [m/s]
+        Geometric mean of the impact speeds of these contacts, along the normal.
     """
 
     stamp_ns: int
@@ -129,3 +134,7 @@ class CorEstimate:
     wall_friction: Measured = UNKNOWN_MEASURED
     drag: Measured = UNKNOWN_MEASURED
     acceleration: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
+    restitution_exponent: Interval = UNKNOWN_INTERVAL
+    wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
+    impact_speed: float = UNKNOWN
+    wall_impact_speed: float = UNKNOWN

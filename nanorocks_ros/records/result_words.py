@@ -107,6 +107,12 @@ FLAGS = {
         'turns',
         'the restitutions are those of contacts alone; compare acceleration with the flight log',
     ),
+    Quality.SPEED_DEPENDENT: Words(
+        'the restitution depends on the impact speed, so that one number does not describe it',
+        'the restitutions are those of contacts alone, near impact_speed and wall_impact_speed; '
+        'restitution_exponent and wall_restitution_exponent say how 1 - restitution goes with '
+        'speed',
+    ),
 }
 """Meaning and remedy of each flag."""
 
@@ -206,9 +212,7 @@ def reason_of(cor: CorEstimate) -> Words | None:
         )
     contacts = f'{cor.rebounds} rebounds and {cor.collisions} collisions'
     if cor.headline is Headline.CONTACTS:
-        why = reason_for_contacts(
-            cor.tension, cor.wall_friction, accelerated=Quality.ACCELERATED in cor.quality
-        )
+        why = reason_for_contacts(cor.tension, cor.wall_friction, cor.quality)
         return Words(
             f'only contacts count{", since " if why else ""}{why}, and {contacts} tell too little '
             'of the beads',

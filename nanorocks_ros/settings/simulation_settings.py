@@ -28,6 +28,30 @@ class SimulationSettings:
     wall_restitution: float = setting(
         0.99, 'coefficient of restitution at the walls', low=0.0, high=1.0
     )
+    restitution_law: str = setting(
+        'constant',
+        'how the restitution between beads depends on the impact speed along the normal: not at '
+        'all, as of viscoelastic spheres, or 1 - restitution as a power of it',
+        choices=('constant', 'viscoelastic', 'power'),
+    )
+    wall_restitution_law: str = setting(
+        'constant',
+        'how the restitution at the walls depends on the impact speed',
+        choices=('constant', 'viscoelastic', 'power'),
+    )
+    restitution_speed: float = setting(
+        0.005,
+        'impact speed at which restitutions with a law that is not constant are as set',
+        'm/s',
+        low=1e-6,
+        high=10.0,
+    )
+    restitution_exponent: float = setting(
+        0.2,
+        'exponent of the impact speed in 1 - restitution, with the law power',
+        low=0.0,
+        high=5.0,
+    )
     floor_lid_difference: float = setting(
         0.0,
         'restitution of floor and lid minus that of the side walls; both stay within 0 and 1',

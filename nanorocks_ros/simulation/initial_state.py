@@ -15,19 +15,27 @@ from nanorocks_ros.physics.stokes_drag import stokes_rate, viscosity_of
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.input_checks import check_room
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
-from nanorocks_ros.simulation.engine.rules.restitution_laws import UniformRestitution
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    PowerLawRestitution,
+    UniformRestitution,
+    ViscoelasticRestitution,
+)
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 from nanorocks_ros.simulation.packing.random_placement import random_positions
 from nanorocks_ros.simulation.velocities import maxwellian, uniform_speeds
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SimulationSettings
+    from nanorocks_ros.simulation.engine.rules.restitution_laws import Restitution, SpeedLaw
 
 _SPHERE = math.pi / 6.0
 _SMOOTH = -1.0
+_CONSTANT = 'constant'
 # Largest speed of the walls of a shaken tray, in mean speeds of the beads.
 _WALL_SPEED = 2.0
 
@@ -90,11 +98,6 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
     SimulationError
         For a range of restitutions outside 0 to 1.
     """
-    restitution: float | UniformRestitution = settings.restitution
-    if settings.restitution_width > 0.0:
-        restitution = UniformRestitution(
-            mean=settings.restitution, width=settings.restitution_width
-        )
     tangential: tuple[float | None, float | None] = (
         settings.tangential_restitution,
         settings.wall_tangential_restitution,
@@ -103,7 +106,7 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
         tangential = None, None
     return CollisionRules(
         box=tray.dimensions,
-        restitution=restitution,
+        restitution=_beads(settings),
         wall_restitution=_walls(settings),
         sticking_speed=settings.sticking_speed,
         wall_sticking_speed=settings.wall_sticking_speed,
@@ -117,11 +120,45 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
     )
 
 
-def _walls(settings: SimulationSettings) -> tuple[float, ...]:
+def _beads(settings: SimulationSettings) -> Restitution:
+    """Restitution of two beads.
+
+    Raises
+    ------
+    SimulationError
+        For one that is drawn at random and depends on speed as well.
+    """
+    constant = settings.restitution_law == _CONSTANT
+    if settings.restitution_width == 0.0:
+        value = settings.restitution
+        return value if constant else _speed_law(settings.restitution_law, value, settings)
+    if not constant:
+        raise SimulationError(
+            'restitution_law',
+            f'{settings.restitution_law!r} with a restitution_width of '
+            f'{settings.restitution_width:g}',
+            'set one of them',
+        )
+    return UniformRestitution(mean=settings.restitution, width=settings.restitution_width)
+
+
+def _walls(settings: SimulationSettings) -> Sequence[float] | Sequence[SpeedLaw]:
     """Restitution of the side walls, two for each axis, and of floor and lid."""
     side = settings.wall_restitution
     ends = min(max(side + settings.floor_lid_difference, 0.0), 1.0)
-    return (side, side, side, side, ends, ends)
+    values = (side, side, side, side, ends, ends)
+    if settings.wall_restitution_law == _CONSTANT:
+        return values
+    return [_speed_law(settings.wall_restitution_law, value, settings) for value in values]
+
+
+def _speed_law(name: str, value: float, settings: SimulationSettings) -> SpeedLaw:
+    at_speed = settings.restitution_speed
+    if name == 'viscoelastic':
+        return ViscoelasticRestitution(value=value, at_speed=at_speed)
+    return PowerLawRestitution(
+        value=value, at_speed=at_speed, exponent=settings.restitution_exponent
+    )
 
 
 def wall_motion(settings: SimulationSettings) -> WallMotion:

@@ -162,12 +162,16 @@ def test_an_acceleration_that_matters_is_told_by_its_size(look, serve, results):
         quality=Quality.ACCELERATED,
         acceleration=MeasuredInterval(2e-3, 1e-4, 1.8e-3, 2.2e-3),
         drag=Measured(0.0312, 0.0121),
+        restitution_exponent=Interval(0.55, 0.41, 0.7),
+        impact_speed=1.42e-3,
+        wall_restitution_exponent=Interval(-0.02, -0.2, 0.16),
     )
     server.take(accelerated)
     page = look(server.url)
     text_is(page, '#acceleration', '2.0 mm/s²')
     text_is(page, '#acceleration', '[1.8, 2.2]')
     text_is(page, '#drag', '0.031 1/s')
+    text_is(page, '#exponent', '[0.41, 0.70] at 1.42 mm/s, walls -0.02 [-0.20, 0.16]')
     server.take(replace(results.cors[-1], drag=Measured(), acceleration=MeasuredInterval()))
     text_is(page, '#acceleration', 'not known yet')
     text_is(page, '#drag', 'not known yet')

@@ -19,7 +19,7 @@ from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.inference.restitution_sources import restitution_sources
-from nanorocks_ros.records import Headline, Measured, headline_in_words, headline_of
+from nanorocks_ros.records import Headline, Measured, Quality, headline_in_words, headline_of
 from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
@@ -122,3 +122,14 @@ def test_the_headline_and_its_reason(contacts, tension, friction, expected, word
     headline = headline_of(contacts, tension, friction)
     assert headline is expected
     assert words in headline_in_words(headline, tension, friction)
+
+
+@pytest.mark.parametrize(
+    ('quality', 'words'),
+    [
+        (Quality.ACCELERATED, 'since an acceleration drives the beads'),
+        (Quality.SPEED_DEPENDENT, 'since the restitution depends on the impact speed'),
+    ],
+)
+def test_a_flag_with_which_the_decay_does_not_count_is_the_reason(quality, words):
+    assert words in headline_in_words(Headline.CONTACTS, 0.5, Measured(), quality)

@@ -13,7 +13,11 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.initial_state import inventory, resting_beads
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    PowerLawRestitution,
+    ViscoelasticRestitution,
+)
+from nanorocks_ros.simulation.initial_state import inventory, resting_beads, rules_of
 from nanorocks_ros.simulation.velocities import uniform_speeds
 
 SETTINGS = SimulationSettings()
@@ -116,3 +120,26 @@ def test_a_tray_without_beads_is_refused():
 def test_resting_beads_keep_clear_of_walls_and_each_other():
     beads = resting_beads(SETTINGS, tray_of(acrylic(15)))
     assert smallest_gap(beads.positions, beads.radii) >= 0.0
+
+
+def test_restitutions_that_depend_on_speed_are_told_by_settings():
+    settings = SimulationSettings(
+        restitution=0.8,
+        restitution_law='viscoelastic',
+        wall_restitution=0.9,
+        wall_restitution_law='power',
+        restitution_speed=0.002,
+        restitution_exponent=0.3,
+        floor_lid_difference=-0.1,
+    )
+    rules = rules_of(settings, load_trays()[1])
+    assert rules.restitution == ViscoelasticRestitution(value=0.8, at_speed=0.002)
+    side = PowerLawRestitution(value=0.9, at_speed=0.002, exponent=0.3)
+    assert rules.wall_restitution[:4] == [side] * 4
+    assert [wall.value for wall in rules.wall_restitution[4:]] == pytest.approx([0.8, 0.8])
+
+
+def test_a_restitution_drawn_at_random_cannot_depend_on_speed_as_well():
+    settings = SimulationSettings(restitution_width=0.1, restitution_law='power')
+    with pytest.raises(SimulationError, match=r"restitution_law: 'power' with .* of 0\.1"):
+        rules_of(settings, load_trays()[1])

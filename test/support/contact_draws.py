@@ -35,9 +35,20 @@ def drawn_rebounds(rng, n, restitution, relative_error=0.05):
         yield drawn_rebound(speed + noise[0], restitution * speed + noise[1], error)
 
 
-def drawn_collision(rng, restitution, *, ratio=0.5, radius_error=0.0, sticking_speed=0.0):
+def drawn_collision(rng, restitution, **values):
     """A collision as it comes about between two beads in a flat gas; drawn until one does."""
-    reach, spread = 2.0 * RADIUS, 1e-3
+    return drawn_impact(rng, lambda _: restitution, **values)[0]
+
+
+def drawn_impact(
+    rng, law, *, ratio=0.5, radius_error=0.0, sticking_speed=0.0, slowest=0.3e-3, spread=1e-3
+):
+    """A collision by a law of the impact speed, and that speed, [m/s].
+
+    `slowest`: projected relative speed from which on it is found; `spread`: root of the
+    temperature.
+    """
+    reach = 2.0 * RADIUS
     while True:
         tilt = rng.uniform(-1.0, 1.0)
         velocity = rng.normal(0.0, math.sqrt(2.0) * spread, 3) * (1.0, 1.0, math.sqrt(ratio))
@@ -46,16 +57,16 @@ def drawn_collision(rng, restitution, *, ratio=0.5, radius_error=0.0, sticking_s
         normal = np.array([part, 0.0, tilt])
         speed = -float(velocity @ normal)
         # As often as they meet, and as their heights allow.
-        accepted = rng.uniform() * 8e-3 < speed and rng.uniform() * RADIUS < room
-        slow = speed < sticking_speed or -velocity[0] < 0.3e-3
+        accepted = rng.uniform() * 8.0 * spread < speed and rng.uniform() * RADIUS < room
+        slow = speed < sticking_speed or -velocity[0] < slowest
         if accepted and not slow and part > 0.9:
             break
-    after = velocity + (1.0 + restitution) * speed * normal
+    after = velocity + (1.0 + law(speed)) * speed * normal
     error, place_error = 3e-5, 4e-6
     noise = rng.normal(0.0, error, (2, 2, 2))
     mean = rng.normal(0.0, spread, 2)
     halves = np.array([[-0.5], [0.5]])
-    return PairCollision(
+    collision = PairCollision(
         stamp_ns=0,
         tray=1,
         tracks=np.array([0, 1], dtype=np.int32),
@@ -73,6 +84,7 @@ def drawn_collision(rng, restitution, *, ratio=0.5, radius_error=0.0, sticking_s
         height=HEIGHT,
         place=np.zeros(2),
     )
+    return collision, speed
 
 
 def drawn_collisions(seed, n, restitution, **values):

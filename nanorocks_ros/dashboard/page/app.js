@@ -140,6 +140,7 @@ function drawNumbers(tray) {
   number('sticking', ...(cluster ? words.sticking(cluster) : ['', 'not known yet']));
   number('drag', ...words.drag(cor));
   number('acceleration', ...words.acceleration(cor));
+  number('exponent', ...words.exponent(cor));
 }
 
 function drawPriors(number) {

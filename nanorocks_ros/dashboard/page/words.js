@@ -106,6 +106,17 @@ export function acceleration(cor) {
   return [`< ${mm(cor.acceleration_upper)} mm/s²`, 'of all beads alike; 0 where the tray floats'];
 }
 
+/** How the restitution of the beads goes with the impact speed, and of the walls besides. */
+export function exponent(cor) {
+  if (!cor || !known(cor.restitution_exponent)) return ['', 'not known yet'];
+  const show = (value) => fixed(value, 2);
+  const between = interval(cor.restitution_exponent_lower, cor.restitution_exponent_upper, show);
+  const walls = known(cor.wall_restitution_exponent)
+    ? `, walls ${show(cor.wall_restitution_exponent)} ${interval(cor.wall_restitution_exponent_lower, cor.wall_restitution_exponent_upper, show)}`
+    : '';
+  return [show(cor.restitution_exponent), `${between} at ${speed(cor.impact_speed)} mm/s${walls}; 0: constant`];
+}
+
 /** What a tray does at present: a state for its colour, words, and fewer words. */
 export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;

@@ -40,9 +40,10 @@ ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
 """Factors by which the true errors of rebounds may exceed the stated ones. Not below 1: many slow
 rebounds, whose stated errors are too large, would then give the few fast ones too much weight."""
 
-# The same factor for collisions, from the scatter of simulated cycles. It is fixed, since
-# collisions cannot separate errors from vertical speeds.
-_PAIR_ERRORS = 1.25
+PAIR_ERRORS = 1.25
+"""The same factor for collisions, from the scatter of simulated cycles. It is fixed, since
+collisions cannot separate errors from vertical speeds."""
+
 _AT_ONCE = 128
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
@@ -171,7 +172,7 @@ def pair_table(
     _check_share(outliers)
     if not collisions:
         return np.zeros((len(vertical_ratios) * len(radius_errors), grid.size))
-    seen = ProjectedCollisions.of(collisions).with_errors(_PAIR_ERRORS)
+    seen = ProjectedCollisions.of(collisions).with_errors(PAIR_ERRORS)
     # In batches, so that memory does not grow with the number of collisions.
     parts = [
         ProjectedCollisions(*(column[k : k + _AT_ONCE] for column in seen))

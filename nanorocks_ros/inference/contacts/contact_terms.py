@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.inference.contacts.contact_likelihood import marginal, pair_table, rebound_table
+from nanorocks_ros.inference.contacts.contact_likelihood import (
+    ERROR_SCALES,
+    marginal,
+    pair_table,
+    rebound_table,
+)
 from nanorocks_ros.inference.contacts.dragged_contacts import loss_beside_contacts, loss_sums
+from nanorocks_ros.inference.contacts.impact_tables import collision_impacts, rebound_impacts
+from nanorocks_ros.inference.contacts.restitution_exponent import bead_exponent, wall_exponent
 from nanorocks_ros.inference.contacts.rubbed_rebounds import rebound_columns, rubbed_likelihood
 from nanorocks_ros.inference.contacts.wall_friction import (
     friction_likelihood,
@@ -24,6 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.contacts.restitution_exponent import RestitutionExponent
 
 _LOWEST_REBOUND = 0.5
 """Lowest restitution of the walls for which rebounds are compared."""
@@ -54,6 +63,8 @@ class ContactTerms:
         Sums of `loss_sums`.
     rubbed : ndarray (n, 12)
         Of `rebound_columns`, for what floor and lid take off.
+    rebound_impacts, collision_impacts : ndarray (n, columns)
+        Rows of `rebound_impacts` and `collision_impacts`.
     """
 
     rebounds: int
@@ -64,6 +75,8 @@ class ContactTerms:
     rebound_losses: NDArray[np.float64]
     collision_losses: NDArray[np.float64]
     rubbed: NDArray[np.float64]
+    rebound_impacts: NDArray[np.float32]
+    collision_impacts: NDArray[np.float32]
 
     @classmethod
     def of(cls, contacts: Iterable[Rebound | PairCollision]) -> ContactTerms:
@@ -80,6 +93,8 @@ class ContactTerms:
             rebound_losses=loss_sums(rebounds),
             collision_losses=loss_sums(collisions),
             rubbed=rebound_columns(rebounds),
+            rebound_impacts=rebound_impacts(rebounds),
+            collision_impacts=collision_impacts(collisions),
         )
 
     def __add__(self, other: ContactTerms) -> ContactTerms:
@@ -92,6 +107,8 @@ class ContactTerms:
             rebound_losses=self.rebound_losses + other.rebound_losses,
             collision_losses=self.collision_losses + other.collision_losses,
             rubbed=np.concatenate([self.rubbed, other.rubbed]),
+            rebound_impacts=np.concatenate([self.rebound_impacts, other.rebound_impacts]),
+            collision_impacts=np.concatenate([self.collision_impacts, other.collision_impacts]),
         )
 
     @property
@@ -150,6 +167,28 @@ class ContactTerms:
             return None
         term = Likelihood1D(restitution=_BEADS, log_likelihood=marginal(self.beads))
         return _slowed(term, loss_beside_contacts(self.collision_losses, slowing), bias)
+
+    def wall_exponent(
+        self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
+    ) -> RestitutionExponent | None:
+        """How the wall restitution depends on speed; None from too few rebounds.
+
+        Parameters
+        ----------
+        bias : float
+            Standard deviation of an error of the restitution that grows by this per factor e in
+            speed.
+        slowing : Slowing, optional
+            What slows beads between contacts.
+        """
+        scale = ERROR_SCALES[int(np.argmax(self.walls.max(axis=1)))]
+        return wall_exponent(self.rebound_impacts, scale, slowing, bias)
+
+    def bead_exponent(
+        self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
+    ) -> RestitutionExponent | None:
+        """How the bead restitution depends on speed, as `wall_exponent`."""
+        return bead_exponent(self.collision_impacts, slowing, bias)
 
 
 def _slowed(term: Likelihood1D, loss: Measured, bias: float) -> Likelihood1D:

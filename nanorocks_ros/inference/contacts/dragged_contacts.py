@@ -31,7 +31,7 @@ _LEAST_ERROR = 0.01
 # friction rate: what made the restitution of the beads right over that, and its relative spread,
 # in trays 1 and 3, frictions of 0.01 to 0.1, drags of 0 and 0.02 /s (`benchmarks.friction`,
 # `benchmarks.drag`).
-_FRICTION_FACTOR, _FRICTION_SPREAD = 0.7, 0.6
+FRICTION_FACTOR, FRICTION_SPREAD = 0.7, 0.6
 
 
 def dragged(contact: Rebound | PairCollision, drag: float) -> Rebound | PairCollision:
@@ -103,7 +103,7 @@ def loss_beside_contacts(sums: NDArray[np.float64], slowing: Slowing) -> Measure
     weight, time, length, taken_out = sums.tolist()
     if not weight > 0.0:
         return Measured(0.0, 0.0)
-    reach = np.array([time, _FRICTION_FACTOR * length]) / weight
+    reach = np.array([time, FRICTION_FACTOR * length]) / weight
     by_friction = max(float(slowing.values[1] * reach[1]), 0.0)
-    variance = float(reach @ slowing.covariance @ reach) + (_FRICTION_SPREAD * by_friction) ** 2
+    variance = float(reach @ slowing.covariance @ reach) + (FRICTION_SPREAD * by_friction) ** 2
     return Measured(float(slowing.values @ reach) - taken_out / weight, math.sqrt(variance))

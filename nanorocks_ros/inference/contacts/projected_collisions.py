@@ -127,6 +127,17 @@ def _tilts(
     return tilt, weight / weight.sum(axis=1)[:, None]
 
 
+def horizontal_parts(
+    seen: ProjectedCollisions, radius_error: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Horizontal part of the unit line of centres, (m,), and its standard deviation, (m,)."""
+    tilt, weight = _tilts(seen, radius_error)
+    part = np.sqrt(1.0 - tilt[0] ** 2)
+    mean = weight @ part
+    spread = np.sqrt(np.maximum(weight @ part**2 - mean**2, 0.0))
+    return mean, spread
+
+
 def projected_log_likelihood(
     seen: ProjectedCollisions,
     grid: NDArray[np.float64],
@@ -135,34 +146,65 @@ def projected_log_likelihood(
     limits: tuple[float, float],
 ) -> NDArray[np.float64]:
     """Log likelihood, (r, n), of collisions for vertical ratios, (r,), at a given radius error."""
+    total: NDArray[np.float64] = projected_log_densities(
+        seen, grid, ratios, radius_error, limits
+    ).sum(axis=1)
+    return total
+
+
+def projected_log_densities(
+    seen: ProjectedCollisions,
+    grid: NDArray[np.float64],
+    ratios: NDArray[np.float64],
+    radius_error: float,
+    limits: tuple[float, float],
+    slope: float = 0.0,
+) -> NDArray[np.float64]:
+    """Log likelihood, (r, m, n), of each collision, as `projected_log_likelihood`.
+
+    Parameters
+    ----------
+    seen : ProjectedCollisions
+    grid : ndarray (n,)
+        Restitutions, at the impact speed of each collision.
+    ratios : ndarray (r,)
+    radius_error : float
+    limits : tuple of 2 floats
+        Sticking speed, [m/s], and fraction of outliers.
+    slope : float
+        By how much the restitution falls where the impact speed rises by a factor e.
+    """
     sticking_speed, outliers = limits
     tilt, weight = _tilts(seen, radius_error)
     likely = weight.max(axis=0) > _UNLIKELY
     tilt, weight = tilt[:, likely], weight[:, likely]
-    total = np.zeros((ratios.size, grid.size))
+    logs = np.empty((ratios.size, len(weight), grid.size))
     for k in range(0, len(weight), _IN_CACHE):
         rows = slice(k, k + _IN_CACHE)
         batch = ProjectedCollisions(*(column[rows] for column in seen))
-        densities = _density(batch, grid, ratios, tilt[0, :, np.newaxis], sticking_speed)
+        kind = tilt[0, :, np.newaxis], sticking_speed, slope
+        densities = _density(batch, grid, ratios, kind)
         density = np.einsum('mh,rmhn->rmn', weight[rows], densities)
         outlier_density = outliers / (RANGE * batch.approach[:, np.newaxis])
-        total += np.log((1.0 - outliers) * density + outlier_density).sum(axis=1)
-    return total
+        logs[:, rows] = np.log((1.0 - outliers) * density + outlier_density)
+    return logs
 
 
 def _density(
     seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
-    tilt: NDArray[np.float64],
-    sticking_speed: float,
+    kind: tuple[NDArray[np.float64], float, float],
 ) -> NDArray[np.float64]:
     """Density of the speeds after collisions, (r, m, h, n), for tilts (h, 1).
+
+    `kind` is these tilts, the sticking speed and the slope of the restitution.
 
     The speed w along the line of centres is the projected speed times its horizontal component p,
     plus the vertical speed, a Gaussian, times the tilt. Collisions are weighted with w, for w
     above the sticking speed. All other factors are Gaussian, so that the integral is closed.
     """
+    tilt, sticking_speed, slope = kind
     part = np.sqrt(1.0 - tilt**2)
     a, c, aa, cc, ac = (
         column[:, None, None]
@@ -170,7 +212,7 @@ def _density(
                     seen.parting_variance, seen.covariance)
     )  # fmt: skip
     vertical = tilt**2 * ratios[:, None, None, None] * seen.temperature[:, None, None]
-    gain = (1.0 + grid) * part
+    gain = (1.0 + grid - slope) * part
     left = gain * part - 1.0
     speed, speed_variance = part * a, part**2 * aa + vertical
     shared = gain * vertical
@@ -178,6 +220,8 @@ def _density(
     variance = gain**2 * vertical
     variance += left**2 * aa + cc - 2.0 * left * ac
     miss = c - (gain * speed - a)
+    # At the impact speed that both measured speeds say, the restitution is that of the grid.
+    miss -= slope * (a + c) / (1.0 + grid)
     share = shared / variance
     given = speed + share * miss
     share *= shared

@@ -46,6 +46,10 @@ class CycleRestitution:
     acceleration : MeasuredInterval
     accelerated : bool
         Whether that is far from 0 and changes the speeds, so that the decay does not count.
+    restitution_exponent, wall_restitution_exponent : Interval
+    impact_speed, wall_impact_speed : float, [m/s]
+    speed_dependent : bool
+        Whether an exponent is not 0, so that neither the decay nor a constant restitution holds.
     """
 
     determined: bool = False
@@ -72,3 +76,8 @@ class CycleRestitution:
     drag: Measured = UNKNOWN_MEASURED
     acceleration: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
     accelerated: bool = False
+    restitution_exponent: Interval = UNKNOWN_INTERVAL
+    wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
+    impact_speed: float = UNKNOWN
+    wall_impact_speed: float = UNKNOWN
+    speed_dependent: bool = False

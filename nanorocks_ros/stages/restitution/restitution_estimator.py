@@ -239,6 +239,8 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
             quality |= Quality.INCONSISTENT
         if result.accelerated:
             quality |= Quality.ACCELERATED
+        if result.speed_dependent:
+            quality |= Quality.SPEED_DEPENDENT
         return (
             CorEstimate(
                 stamp_ns=last.stamp_ns,
@@ -275,6 +277,10 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
                 wall_friction=result.wall_friction,
                 drag=result.drag,
                 acceleration=result.acceleration,
+                restitution_exponent=result.restitution_exponent,
+                wall_restitution_exponent=result.wall_restitution_exponent,
+                impact_speed=result.impact_speed,
+                wall_impact_speed=result.wall_impact_speed,
             ),
         )
 

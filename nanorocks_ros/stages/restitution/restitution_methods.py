@@ -27,6 +27,7 @@ from nanorocks_ros.inference.restitution_sources import (
     intervals_of,
     restitution_sources,
 )
+from nanorocks_ros.inference.speed_dependence import RunningDependence, speed_dependence
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED,
@@ -200,6 +201,7 @@ class DecayLibraryMethod:
         self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
         self._probability = settings.cooling.probability
         self._include_inconsistent = settings.cooling.include_inconsistent
+        self._dependence = RunningDependence()
         self.evidence: CycleLikelihoods | None = None
         self._means_so_far = UNKNOWN_MEASURED, UNKNOWN_MEASURED
 
@@ -228,7 +230,9 @@ class DecayLibraryMethod:
         )
         integrated = likelihood.integrated(friction)
         accelerated = losses.is_accelerated and self._drives(losses, decay)
-        sources = self._sources(integrated, terms, losses, decays=0 if accelerated else 1)
+        dependence = self._dependence.of(terms, losses, self._prior, final=final)
+        decays = 0 if accelerated or dependence.is_seen else 1
+        sources = self._sources(integrated, terms, losses, decays=decays)
         best = int(np.argmax(integrated))
         result = replace(
             self._speeds(decay, final=final),
@@ -238,6 +242,7 @@ class DecayLibraryMethod:
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
             acceleration=losses.magnitude(self._probability),
             accelerated=accelerated,
+            **dependence.fields(self._ends),
             reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         )
         restitution, wall_restitution = sources.intervals(self._ends)
@@ -253,8 +258,9 @@ class DecayLibraryMethod:
             # Rebounds determine the walls even where nothing is known of the beads.
             result = replace(result, wall_restitution=wall_restitution)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
+        trusted = trusted and decays > 0
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=terms, flights=flights)
-        mean, wall_mean = self._means(own, final=final, trusted=trusted and not accelerated)
+        mean, wall_mean = self._means(own, final=final, trusted=trusted)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
 
     def _drag_of_gas(self, drag: Measured) -> Measured:
@@ -316,6 +322,8 @@ class DecayLibraryMethod:
         decays = evidence.cycles - evidence.by_contacts
         losses = flight_losses(evidence.flights, self._drag_prior)
         friction = friction_weights(self._prior, contacts)
+        dependence = speed_dependence(contacts, losses, self._prior)
+        decays = 0 if dependence.is_seen else decays
         sources = self._sources(decay.integrated(friction), contacts, losses, decays=decays)
         intervals, means = sources.intervals(self._ends), sources.means
         restitution, wall_restitution = (
@@ -333,6 +341,7 @@ class DecayLibraryMethod:
             headline=sources.headline,
             wall_friction=sources.wall_friction,
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
+            **dependence.fields(self._ends),
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> CycleRestitution:

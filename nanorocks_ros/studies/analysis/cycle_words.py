@@ -159,6 +159,7 @@ def cycle_lines(
     if reason is not None:
         lines.append(f'  reason: {reason.text}; {reason.remedy}')
     lines += _source_lines(cor)
+    lines += _exponent_lines(cor)
     lines += _flight_lines(cor)
     lines += _decay_lines(cor)
     if cor.samples:
@@ -192,8 +193,7 @@ def _cor_text(cor: CorEstimate) -> str:
 
 
 def _headline(cor: CorEstimate) -> str:
-    accelerated = Quality.ACCELERATED in cor.quality
-    return headline_in_words(cor.headline, cor.tension, cor.wall_friction, accelerated=accelerated)
+    return headline_in_words(cor.headline, cor.tension, cor.wall_friction, cor.quality)
 
 
 def _source_lines(cor: CorEstimate) -> list[str]:
@@ -216,6 +216,25 @@ def _source_lines(cor: CorEstimate) -> list[str]:
             f'+- {cor.wall_friction.error:.4f}'
         )
     return lines
+
+
+def _exponent_lines(cor: CorEstimate) -> list[str]:
+    """How the restitutions go with the impact speed; nothing where contacts do not tell it."""
+    parts = [
+        f'{name} {_interval(exponent, 2)} at {_MM * speed:.2f} mm/s'
+        for name, exponent, speed in (
+            ('beads', cor.restitution_exponent, cor.impact_speed),
+            ('walls', cor.wall_restitution_exponent, cor.wall_impact_speed),
+        )
+        if math.isfinite(exponent.value)
+    ]
+    if not parts:
+        return []
+    seen = 'depends' if Quality.SPEED_DEPENDENT in cor.quality else 'need not depend'
+    return [
+        f'  restitution {seen} on the impact speed; exponent of 1 - restitution: '
+        f'{", ".join(parts)}'
+    ]
 
 
 def _flight_lines(cor: CorEstimate) -> list[str]:

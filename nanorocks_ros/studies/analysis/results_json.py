@@ -40,6 +40,11 @@ BY_SOURCE = tuple(
     if field.name.startswith(('joint_', 'decay_', 'contact_', 'wall_friction'))
 )
 """Restitutions by each source; those without a source are of the one that `headline` names."""
+_EXPONENTS = tuple(
+    field.name
+    for field in layout(CorEstimate).fields
+    if '_exponent' in field.name or field.name.endswith('impact_speed')
+)
 _RESTITUTIONS = (
     *('initial_speed', 'initial_speed_error', 'haff_time', 'haff_time_error'),
     *('restitution', 'restitution_lower', 'restitution_upper'),
@@ -50,6 +55,7 @@ _RESTITUTIONS = (
     *BY_SOURCE,
     *('drag', 'drag_error'),
     *('acceleration', 'acceleration_error', 'acceleration_lower', 'acceleration_upper'),
+    *_EXPONENTS,
 )
 _SPECIES_DECAYS = tuple(
     field.name for field in layout(CorEstimate).fields if '_species_' in field.name

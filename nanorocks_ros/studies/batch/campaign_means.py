@@ -18,6 +18,7 @@ from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.pipeline.composition import TrayStages, trays_of
 from nanorocks_ros.records import (
+    UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED_INTERVAL,
     Headline,
     Measured,
@@ -324,6 +325,8 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
         'headline': mean.headline.name.lower() if mean else None,
         'wall_friction': finite_or_none(mean.wall_friction.value) if mean else None,
         'wall_friction_error': finite_or_none(mean.wall_friction.error) if mean else None,
+        'speed_dependent': mean.speed_dependent if mean else None,
+        **_exponents_as_json(mean),
         'tension': finite_or_none(mean.tension) if mean else None,
         'rebounds': mean.rebounds if mean else 0,
         'collisions': mean.collisions if mean else 0,
@@ -344,6 +347,22 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
             f'{name}_cycles': value.cycles,
         }
     return fields_of_tray
+
+
+def _exponents_as_json(mean: MeanRestitution | None) -> dict[str, float | None]:
+    """How the restitutions depend on the impact speed."""
+    values: dict[str, float | None] = {}
+    for prefix in ('', 'wall_'):
+        name = f'{prefix}restitution_exponent'
+        exponent = getattr(mean, name) if mean else UNKNOWN_INTERVAL
+        speed = getattr(mean, f'{prefix}impact_speed') if mean else math.nan
+        values |= {
+            name: finite_or_none(exponent.value),
+            f'{name}_lower': finite_or_none(exponent.lower),
+            f'{name}_upper': finite_or_none(exponent.upper),
+            f'{prefix}impact_speed': finite_or_none(speed),
+        }
+    return values
 
 
 def _interval_as_json(name: str, quantity: MeasuredInterval) -> dict[str, float | None]:

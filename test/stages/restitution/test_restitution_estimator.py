@@ -389,6 +389,29 @@ def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
     assert final.quality & Quality.INCONSISTENT
 
 
+def test_walls_whose_restitution_depends_on_speed_are_flagged():
+    rng = np.random.default_rng(1)
+    seen = wall_rebounds(
+        rng, 80, 2.0, 17.0, wall=lambda speed: 1.0 - 0.1 * speed / 2e-3, error=2e-5
+    )
+    *_, final = all_estimates(fitter(), by_stamp([*simulated_cycle(wall=0.9), *seen]))
+    assert final.quality & Quality.SPEED_DEPENDENT
+    assert final.headline is Headline.CONTACTS
+    assert final.wall_restitution_exponent.lower < 1.0 < final.wall_restitution_exponent.upper
+    assert final.wall_impact_speed == pytest.approx(2.3e-3, rel=0.1)
+    assert final.wall_restitution == final.contact_wall_restitution
+    # Without collisions nothing is known of the beads.
+    assert math.isnan(final.restitution_exponent.value)
+    assert math.isnan(final.impact_speed)
+
+
+def test_walls_of_constant_restitution_are_not():
+    seen = wall_rebounds(np.random.default_rng(2), 80, 2.0, 17.0)
+    *_, final = all_estimates(fitter(), by_stamp([*simulated_cycle(), *seen]))
+    assert Quality.SPEED_DEPENDENT not in final.quality
+    assert final.wall_restitution_exponent.lower < 0.0 < final.wall_restitution_exponent.upper
+
+
 def with_flights(drag, acceleration=(0.0, 0.0)):
     """The final estimate of a simulated cycle in vacuum, with such flights and 40 rebounds."""
     rebounds = wall_rebounds(np.random.default_rng(1), 40, 2.0, 17.0)

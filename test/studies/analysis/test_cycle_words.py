@@ -139,6 +139,25 @@ def test_an_inconsistent_cycle_is_flagged_with_its_tension_and_left_out():
     assert '--include-inconsistent' in text
 
 
+def test_how_the_restitution_goes_with_speed_is_said():
+    cor = replace(
+        FINAL,
+        quality=Quality.SPEED_DEPENDENT,
+        headline=Headline.CONTACTS,
+        restitution_exponent=Interval(0.55, 0.41, 0.7),
+        impact_speed=1.42e-3,
+    )
+    text = text_of(cor)
+    assert 'contacts alone, since the restitution depends on the impact speed' in text
+    assert 'restitution depends on the impact speed; exponent of 1 - restitution: ' in text
+    assert 'beads 0.55 [0.41, 0.70] at 1.42 mm/s' in text
+    assert 'walls' not in text.split('exponent of 1 - restitution')[1].splitlines()[0]
+    assert 'one number does not describe it' in text
+    constant = replace(cor, quality=NOTHING_WRONG, headline=Headline.JOINT)
+    assert 'need not depend' in text_of(constant)
+    assert 'depend' not in text_of(FINAL)
+
+
 @pytest.mark.parametrize(
     ('change', 'words'),
     [

@@ -58,7 +58,7 @@ from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     CONSTANT,
     UNIFORM,
     random_restitution,
-    viscoelastic_restitution,
+    restitution_at,
 )
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def pair_restitution(state: State, rules: Rules, i: int, j: int, speed: float) -
         beads = as_int64(state.links[a, ORIGINAL]), as_int64(state.links[b, ORIGINAL])
         counts = as_int64(state.links[a, COUNTER]), as_int64(state.links[b, COUNTER])
         return random_restitution(rules.first, rules.second, rules.seed_key, beads, counts)
-    return float(viscoelastic_restitution(rules.first * (speed * rules.second) ** 0.1))
+    return float(restitution_at(rules.kind, rules.first, rules.second, rules.exponent, speed))
 
 
 @inlined

@@ -63,6 +63,7 @@ from nanorocks_ros.simulation.engine.gas_state import (
 )
 from nanorocks_ros.simulation.engine.integer_width import as_int64
 from nanorocks_ros.simulation.engine.recent_contacts import is_repeated
+from nanorocks_ros.simulation.engine.rules.restitution_laws import CONSTANT, restitution_at
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
@@ -186,11 +187,15 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     if sticks_to_wall(state, rules, i, axis):
         return stick_to_wall(state, rules, i, wall, now)
     state.counts[WALL] += 1
+    before = rows[i, VX + axis] - wall_speed
     restitution = rules.wall_restitution[wall]
     if elastic:
         state.counts[ELASTIC_WALL] += 1
         restitution = 1.0
-    before = rows[i, VX + axis] - wall_speed
+    elif rules.wall_kind != CONSTANT:
+        restitution = restitution_at(
+            rules.wall_kind, restitution, rules.wall_per_speed, rules.wall_exponent, abs(before)
+        )
     after = -restitution * before
     if rules.moving:
         after = with_least_rebound(state, rules, i, wall, now, after)

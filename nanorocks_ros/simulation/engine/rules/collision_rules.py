@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,11 +14,12 @@ from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.simulation.engine.rules.restitution_laws import (
     CONSTANT,
     UNIFORM,
-    VISCOELASTIC,
+    PowerLawRestitution,
     Restitution,
+    SpeedLaw,
     UniformRestitution,
     ViscoelasticRestitution,
-    viscoelastic_scale,
+    compiled_law,
 )
 from nanorocks_ros.simulation.engine.rules.rule_checks import (
     checked_axes,
@@ -41,6 +42,7 @@ CONTACT_DURATION = 4e-5
 
 _NOT_STICKING = 0.0
 _WALLS = 6
+_OfWalls = tuple[float, float, float, float, float, float]
 
 STICKING_MEASURES = 'normal', 'total'
 
@@ -55,8 +57,12 @@ class Rules(NamedTuple):
     restitution: NDArray[np.float64]
     first: float
     second: float
+    exponent: float
     seed_key: np.uint64
-    wall_restitution: tuple[float, float, float, float, float, float]
+    wall_kind: int
+    wall_restitution: _OfWalls
+    wall_per_speed: float
+    wall_exponent: float
     contact_duration: float
     sticky: bool
     sticking_speed: float
@@ -88,8 +94,8 @@ class CollisionRules:
     restitution : float, or (n_species, n_species) array, or a law, 0 to 1
         Of the normal relative velocity of two beads: constant, by species, drawn at random or
         falling with speed.
-    wall_restitution : float or 6 floats, 0 to 1
-        Low and high wall of x, y and z.
+    wall_restitution : float or a law that falls with speed, or 6 of them, 0 to 1
+        Low and high wall of x, y and z. Laws may differ in their value alone.
     contact_duration : float, [s], >= 0
         A contact is elastic when the last one of the same two beads (or of the same bead and
         wall) was less than this ago; without it, inelastic collapse leads to events without
@@ -127,7 +133,7 @@ class CollisionRules:
     box: tuple[float, float, float]
     periodic: tuple[bool, bool, bool] = (False, False, False)
     restitution: Restitution | Sequence[Sequence[float]] | NDArray[np.float64] = 1.0
-    wall_restitution: float | Sequence[float] = 1.0
+    wall_restitution: float | SpeedLaw | Sequence[float] | Sequence[SpeedLaw] = 1.0
     contact_duration: float = CONTACT_DURATION
     sticking_speed: float = _NOT_STICKING
     wall_sticking_speed: float = _NOT_STICKING
@@ -148,7 +154,7 @@ class CollisionRules:
     def species(self) -> int:
         """Number of species in the table of restitutions; 1 for a law or a single value."""
         law = self.restitution
-        if isinstance(law, UniformRestitution | ViscoelasticRestitution):
+        if isinstance(law, UniformRestitution | ViscoelasticRestitution | PowerLawRestitution):
             return 1
         return int(np.atleast_2d(np.asarray(law, dtype=np.float64)).shape[0])
 
@@ -161,7 +167,8 @@ class CollisionRules:
             For an invalid value.
         """
         self._check_sticking()
-        kind, table, first, second = self._law()
+        kind, table, first, second, exponent = self._law()
+        wall_kind, walls, wall_per_speed, wall_exponent = self._walls()
         sides = checked_box(self.box)
         motion = self.motion or WallMotion(amplitude=(0.0, 0.0, 0.0), angular_frequency=1.0)
         if self.motion is not None:
@@ -174,8 +181,12 @@ class CollisionRules:
             restitution=table,
             first=first,
             second=second,
+            exponent=exponent,
             seed_key=key_for(self.seed, self.run, Purpose.RESTITUTION),
-            wall_restitution=self._walls(),
+            wall_kind=wall_kind,
+            wall_restitution=walls,
+            wall_per_speed=wall_per_speed,
+            wall_exponent=wall_exponent,
             contact_duration=checked_non_negative('contact_duration', self.contact_duration, 's'),
             sticky=self.sticking_speed > 0.0 or self.wall_sticking_speed > 0.0,
             sticking_speed=float(self.sticking_speed),
@@ -213,7 +224,7 @@ class CollisionRules:
                 'let the tray be at rest, or set it to 0',
             )
 
-    def _law(self) -> tuple[int, NDArray[np.float64], float, float]:
+    def _law(self) -> tuple[int, NDArray[np.float64], float, float, float]:
         law = self.restitution
         none = np.zeros((1, 1))
         if isinstance(law, UniformRestitution):
@@ -225,9 +236,10 @@ class CollisionRules:
                     f'{law!r} reaches from {low:.6g} to {high:.6g}',
                     'keep mean ± width / 2 within 0 to 1',
                 )
-            return UNIFORM, none, float(law.mean), float(law.width)
-        if isinstance(law, ViscoelasticRestitution):
-            return VISCOELASTIC, none, *viscoelastic_scale(law)
+            return UNIFORM, none, float(law.mean), float(law.width), 0.0
+        if isinstance(law, ViscoelasticRestitution | PowerLawRestitution):
+            kind, argument, per_speed, exponent = compiled_law('restitution', law)
+            return kind, none, argument, per_speed, exponent
         table = np.atleast_2d(checked_restitutions('restitution', law, self.allow_gain))
         if table.ndim != 2 or table.shape[0] != table.shape[1] or np.any(table != table.T):
             raise SimulationError(
@@ -235,18 +247,42 @@ class CollisionRules:
                 f'not a symmetric table, shape {table.shape}',
                 'give one row and one column for each species',
             )
-        return CONSTANT, table, 0.0, 0.0
+        return CONSTANT, table, 0.0, 0.0, 0.0
 
-    def _walls(self) -> tuple[float, float, float, float, float, float]:
-        restitutions = checked_restitutions(
-            'wall_restitution', self.wall_restitution, self.allow_gain
-        )
-        if restitutions.shape not in ((), (_WALLS,)):
-            raise SimulationError(
-                'wall_restitution', f'shape {restitutions.shape}', f'give one value or {_WALLS}'
+    def _walls(self) -> tuple[int, _OfWalls, float, float]:
+        """Kind, restitution or argument of each wall, inverse of the speed, and exponent."""
+        given: Any = self.wall_restitution
+        laws = _speed_laws(given)
+        if laws:
+            kinds, arguments, per_speeds, exponents = zip(
+                *(compiled_law('wall_restitution', law) for law in laws), strict=True
             )
-        a, b, c, d, e, f = np.broadcast_to(restitutions, _WALLS).tolist()
-        return a, b, c, d, e, f
+            if len({*zip(kinds, per_speeds, exponents, strict=True)}) > 1:
+                raise SimulationError(
+                    'wall_restitution', f'{given!r}', 'give walls laws that differ in their value'
+                )
+            return kinds[0], _of_walls(np.array(arguments)), per_speeds[0], exponents[0]
+        restitutions = checked_restitutions('wall_restitution', given, self.allow_gain)
+        return CONSTANT, _of_walls(restitutions), 0.0, 0.0
+
+
+def _speed_laws(walls: object) -> list[SpeedLaw]:
+    """The laws of walls that are all given by one; empty where none is."""
+    given = list(walls) if isinstance(walls, list | tuple) else [walls]
+    laws = [law for law in given if isinstance(law, ViscoelasticRestitution | PowerLawRestitution)]
+    if laws and len(laws) < len(given):
+        raise SimulationError('wall_restitution', f'{walls!r}', 'give all walls a law, or none')
+    return laws
+
+
+def _of_walls(values: NDArray[np.float64]) -> _OfWalls:
+    """One value for all walls, or one each."""
+    if values.shape not in ((), (1,), (_WALLS,)):
+        raise SimulationError(
+            'wall_restitution', f'shape {values.shape}', f'give one value or {_WALLS}'
+        )
+    a, b, c, d, e, f = np.broadcast_to(values, _WALLS).tolist()
+    return a, b, c, d, e, f
 
 
 def restitution_table(table: NDArray[np.float64], n_species: int) -> NDArray[np.float64]:

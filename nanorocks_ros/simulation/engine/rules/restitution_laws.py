@@ -1,4 +1,4 @@
-"""Laws of the normal restitution of two beads: constant, uniformly random, viscoelastic."""
+"""Laws of the normal restitution: constant, uniformly random, viscoelastic, a power of speed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.numerics.counter_rng import hashed, uniform
 
 # The laws.
-CONSTANT, UNIFORM, VISCOELASTIC = range(3)
+CONSTANT, UNIFORM, VISCOELASTIC, POWER = range(4)
 
 # Müller, Pöschel 2011, Phys. Rev. E 84, 021302: numerator and denominator.
 _C1 = 0.501086
 _B1, _B2, _B3, _B4 = 0.501086, 1.15345, 0.577977, 0.532178
+# Of the speed, in the argument of that form.
+_VISCOELASTIC_POWER = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +55,49 @@ class ViscoelasticRestitution:
     at_speed: float
 
 
-Restitution = float | UniformRestitution | ViscoelasticRestitution
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerLawRestitution:
+    """A restitution that falls from 1 by a loss that goes with a power of the impact speed.
+
+    Where the loss would be above 1, the restitution is 0.
+
+    Parameters
+    ----------
+    value : float, 0 to 1
+    at_speed : float, [m/s], > 0
+        Normal speed of the impact that leaves this restitution.
+    exponent : float, >= 0
+        0 is constant; about 1/5 for viscoelastic spheres that lose little.
+    """
+
+    value: float
+    at_speed: float
+    exponent: float
+
+
+SpeedLaw = ViscoelasticRestitution | PowerLawRestitution
+"""A law by which the restitution depends on the impact speed."""
+Restitution = float | UniformRestitution | SpeedLaw
+
+
+@inlined
+def restitution_at(
+    kind: int, argument: float, per_speed: float, exponent: float, speed: float
+) -> float:
+    """Restitution of an impact by `VISCOELASTIC` or `POWER`.
+
+    Parameters
+    ----------
+    kind : int
+    argument, per_speed, exponent : float
+        From `compiled_law`.
+    speed : float, [m/s]
+        Along the normal.
+    """
+    ratio = (speed * per_speed) ** exponent
+    if kind == POWER:
+        return max(1.0 - (1.0 - argument) * ratio, 0.0)
+    return float(viscoelastic_restitution(argument * ratio))
 
 
 @compiled
@@ -82,18 +126,30 @@ def random_restitution(
     return mean + width * (uniform(inner, counts[1]) - 0.5)
 
 
-def viscoelastic_scale(law: ViscoelasticRestitution) -> tuple[float, float]:
-    """Argument of the Padé form at the given speed, and the inverse of that speed.
+def compiled_law(name: str, law: SpeedLaw) -> tuple[int, float, float, float]:
+    """Kind, argument, inverse of the speed and exponent of a law, for `restitution_at`.
+
+    Parameters
+    ----------
+    name : str
+        Rule that has the law, for the error.
+    law : ViscoelasticRestitution or PowerLawRestitution
 
     Raises
     ------
     SimulationError
-        For a restitution outside (0, 1), or a speed that is not positive.
+        For a restitution or exponent outside its range, or a speed that is not positive.
     """
-    if not (0.0 < law.value < 1.0 and math.isfinite(law.at_speed) and law.at_speed > 0.0):
-        raise SimulationError(
-            'restitution', f'{law!r}', 'give a value between 0 and 1 at a positive speed'
-        )
+    if not (math.isfinite(law.at_speed) and law.at_speed > 0.0):
+        raise SimulationError(name, f'{law!r}', 'give a restitution at a positive speed')
+    if isinstance(law, PowerLawRestitution):
+        if not (0.0 <= law.value <= 1.0 and 0.0 <= law.exponent < math.inf):
+            raise SimulationError(
+                name, f'{law!r}', 'give a value from 0 to 1 and an exponent of 0 or more'
+            )
+        return POWER, law.value, 1.0 / law.at_speed, law.exponent
+    if not 0.0 < law.value < 1.0:
+        raise SimulationError(name, f'{law!r}', 'give a value between 0 and 1')
     low, high = 0.0, 1.0
     while viscoelastic_restitution(high) > law.value:
         high *= 2.0
@@ -102,4 +158,4 @@ def viscoelastic_scale(law: ViscoelasticRestitution) -> tuple[float, float]:
         low, high = (
             (middle, high) if viscoelastic_restitution(middle) > law.value else (low, middle)
         )
-    return 0.5 * (low + high), 1.0 / law.at_speed
+    return VISCOELASTIC, 0.5 * (low + high), 1.0 / law.at_speed, _VISCOELASTIC_POWER

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from gases import BOX
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    PowerLawRestitution,
     UniformRestitution,
     ViscoelasticRestitution,
 )
@@ -26,6 +28,13 @@ def motion(**change):
 
 def uniform(mean, width):
     return {'restitution': UniformRestitution(mean=mean, width=width)}
+
+
+LAW = PowerLawRestitution(value=0.9, at_speed=1.0, exponent=0.2)
+
+
+def power_law(value, exponent):
+    return {'restitution': replace(LAW, value=value, exponent=exponent)}
 
 
 def viscoelastic(value, at_speed):
@@ -66,6 +75,17 @@ def viscoelastic(value, at_speed):
         (viscoelastic(0.8, 0.0), 'restitution: .* at a positive speed'),
         (viscoelastic(0.8, INF), 'restitution: .* at a positive speed'),
         (viscoelastic(0.8, NAN), 'restitution: .* at a positive speed'),
+        (power_law(1.1, 0.2), 'restitution: .* an exponent of 0 or more'),
+        (power_law(0.8, -0.2), 'restitution: .* an exponent of 0 or more'),
+        (power_law(0.8, INF), 'restitution: .* an exponent of 0 or more'),
+        (power_law(NAN, 0.2), 'restitution: '),
+        ({'wall_restitution': replace(LAW, value=1.2)}, 'wall_restitution: .* from 0 to 1'),
+        ({'wall_restitution': [LAW, 0.9]}, 'wall_restitution: .* give all walls a law, or none'),
+        ({'wall_restitution': [LAW, LAW]}, r'wall_restitution: shape \(2,\)'),
+        (
+            {'wall_restitution': [LAW] * 5 + [replace(LAW, exponent=0.3)]},
+            'wall_restitution: .* laws that differ in their value',
+        ),
         ({'wall_restitution': 2.0}, 'wall_restitution: 2.0 is outside'),
         ({'wall_restitution': (1, 1, 1, 1, 1, -1)}, 'wall_restitution: -1.0 is outside'),
         ({'wall_restitution': (1, 1, 1, 1, 1, NAN)}, 'wall_restitution: nan is outside'),

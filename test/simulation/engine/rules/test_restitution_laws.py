@@ -12,6 +12,7 @@ from gases import BOX, KERNELS, energy, gas_of, mixture, near
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
 from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    PowerLawRestitution,
     UniformRestitution,
     ViscoelasticRestitution,
 )
@@ -147,6 +148,54 @@ def test_a_gas_of_viscoelastic_beads_becomes_more_elastic_as_it_cools(kernel):
     gas = HardSphereGas(beads, rules, kernel)
     restitution_values = restitutions(gas.follow(200.0, log=True).events, beads.masses)
     assert restitution_values[-50:].mean() > restitution_values[:50].mean() + 0.03
+
+
+@pytest.mark.parametrize('exponent', [0.0, 0.2, 0.6])
+def test_a_loss_goes_with_a_power_of_speed_and_is_1_at_most(kernel, exponent):
+    law = PowerLawRestitution(value=0.9, at_speed=0.5, exponent=exponent)
+    for speed in (1e-3, 0.5, 20.0, 1e9):
+        expected = max(1.0 - 0.1 * (speed / 0.5) ** exponent, 0.0)
+        assert rebound(kernel, law, speed=speed) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    'law',
+    [
+        PowerLawRestitution(value=0.8, at_speed=0.7, exponent=0.5),
+        ViscoelasticRestitution(value=0.8, at_speed=0.7),
+    ],
+)
+def test_walls_follow_the_laws_of_beads(kernel, law):
+    for speed in (0.1, 0.7, 3.0):
+        gas = gas_of([(5, 5, 5)], [(speed, 0, 0)], wall_restitution=law, kernel=kernel)
+        gas.run_until(6.0 / speed)
+        kept = -gas.beads().velocities[0, 0] / speed
+        assert kept == pytest.approx(rebound(kernel, law, speed=speed), abs=1e-9)
+        assert gas.counts.wall == 1
+
+
+def test_each_wall_may_have_its_own_value_of_a_law(kernel):
+    laws = [
+        PowerLawRestitution(value=value, at_speed=1.0, exponent=0.5)
+        for value in (0.9, 0.5, 0.9, 0.9, 0.9, 0.9)
+    ]
+    gas = gas_of([(5, 5, 5)], [(1.0, 0, 0)], wall_restitution=laws, kernel=kernel)
+    gas.run_until(6.0)
+    assert gas.beads().velocities[0, 0] == pytest.approx(-0.5, abs=1e-12)
+
+
+def test_an_exponent_of_0_is_a_constant_restitution(kernel):
+    rules = CollisionRules(box=BOX, restitution=0.7, wall_restitution=0.9)
+    law = replace(
+        rules,
+        restitution=PowerLawRestitution(value=0.7, at_speed=1.0, exponent=0.0),
+        wall_restitution=PowerLawRestitution(value=0.9, at_speed=1.0, exponent=0.0),
+    )
+    beads = mixture(1, 8, rules)
+    constant, power = (
+        HardSphereGas(beads, each, kernel).follow(3.0, [3.0]) for each in (rules, law)
+    )
+    np.testing.assert_allclose(constant.positions, power.positions, rtol=1e-6)
 
 
 @pytest.mark.parametrize('rule', ['restitution', 'wall_restitution'])

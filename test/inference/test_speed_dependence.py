@@ -1,0 +1,71 @@
+"""Whether restitutions depend on the impact speed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from contact_draws import drawn_rebound
+
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.cycle_likelihoods import MeanRestitution
+from nanorocks_ros.inference.flights.flight_losses import flight_losses, flight_table
+from nanorocks_ros.inference.speed_dependence import (
+    RunningDependence,
+    SpeedDependence,
+    speed_dependence,
+)
+from nanorocks_ros.records import Measured
+from nanorocks_ros.settings import PriorSettings
+from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
+
+ENDS = np.array([0.025, 0.5, 0.975])
+PRIOR = PriorSettings()
+NO_FLIGHTS = flight_losses(flight_table(()), Measured(0.0, 0.0))
+
+
+def terms(n, exponent, seed=1):
+    rng = np.random.default_rng(seed)
+    speeds = np.exp(rng.uniform(np.log(1e-3), np.log(1e-2), n))
+    noise = rng.normal(0.0, 0.01, (n, 2))
+    return ContactTerms.of(
+        drawn_rebound(
+            speed * (1.0 + change[0]),
+            speed * (1.0 - 0.1 * (speed / 3e-3) ** exponent + change[1]),
+            0.01 * speed,
+        )
+        for speed, change in zip(speeds, noise, strict=True)
+    )
+
+
+def test_a_constant_restitution_does_not_depend_and_a_falling_one_does():
+    constant = speed_dependence(terms(100, 0.0), NO_FLIGHTS, PRIOR)
+    falling = speed_dependence(terms(100, 0.5), NO_FLIGHTS, PRIOR)
+    assert not constant.is_seen
+    assert falling.is_seen
+    assert falling.beads is None
+    assert not SpeedDependence().is_seen
+
+
+@pytest.mark.parametrize('kind', [CycleRestitution, MeanRestitution])
+def test_the_fields_are_those_of_the_results(kind):
+    fields = speed_dependence(terms(100, 0.5), NO_FLIGHTS, PRIOR).fields(ENDS)
+    more = {'cycles': 1, 'restitution': None} if kind is MeanRestitution else {}
+    result = kind(**more, **fields)
+    assert result.speed_dependent
+    assert 0.0 < result.wall_restitution_exponent.lower < 0.5
+    assert 1e-3 < result.wall_impact_speed < 1e-2
+    assert np.isnan(result.restitution_exponent.value)
+    assert np.isnan(result.impact_speed)
+
+
+def test_while_a_cycle_cools_a_tenth_more_contacts_are_awaited():
+    running = RunningDependence()
+
+    def of(n, *, final=False):
+        dependence = running.of(terms(n, 0.5), NO_FLIGHTS, PRIOR, final=final)
+        return dependence.walls.contacts if dependence.walls else 0
+
+    assert of(10) == 0
+    assert [of(n) for n in (40, 43, 44, 48)] == [40, 40, 44, 44]
+    assert of(48, final=True) == 48
+    assert of(30) == 30
