@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import argparse
 
+    from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
     from nanorocks_ros.studies.gas_statistics.tray_statistics import GasChoices, TrayStatistics
 
 _MM = 1e3
@@ -82,9 +83,7 @@ def run(options: argparse.Namespace) -> int:
         )
     for notice in (*assumed, *bag.notices):
         print(f'nanorocks: {notice}', file=sys.stderr)
-    statistics = {
-        number: _measure(bag.tracks[number], tray, choices) for number, tray in bag.trays.items()
-    }
+    statistics = _measure(bag, choices)
     if options.json:
         trays = {str(number): statistics_values(tray) for number, tray in statistics.items()}
         print(json.dumps({'frames': bag.frames, 'trays': trays}, allow_nan=False))
@@ -96,12 +95,26 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _measure(tracks: Any, tray: Any, choices: GasChoices) -> TrayStatistics:
+def _measure(bag: TrackedBag, choices: GasChoices) -> dict[int, TrayStatistics]:
+    """The statistics of each tray in which beads move; all others are told of."""
+    from nanorocks_ros.errors import FitError
     from nanorocks_ros.studies.gas_statistics.tray_statistics import tray_statistics
 
-    statistics = tray_statistics(tracks, tray, choices)
-    for notice in statistics.notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    statistics = {}
+    for number, tray in bag.trays.items():
+        try:
+            statistics[number] = tray_statistics(bag.tracks[number], tray, choices)
+        except FitError as error:
+            if len(bag.trays) == 1:
+                raise
+            print(f'nanorocks: {error}', file=sys.stderr)
+            continue
+        for notice in statistics[number].notices:
+            print(f'nanorocks: {notice}', file=sys.stderr)
+    if not statistics:
+        raise FitError(
+            'statistics', 'no tray has beads that move measurably', 'give an earlier start'
+        )
     return statistics
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.physics.confined_theory import confined_gas
+from nanorocks_ros.physics.kinetic_theory import check_restitution
 from nanorocks_ros.studies.gas_statistics.collision_rates import collision_rate, theory_rates
 from nanorocks_ros.studies.gas_statistics.displacement_windows import split_cycles
 from nanorocks_ros.studies.gas_statistics.pair_correlations import pair_correlations
@@ -58,12 +59,26 @@ class GasChoices:
         Part of each cycle, since its shaking event.
     restitution, wall_restitution : float, [0, 1]
         Of the gas that the collisions are compared with.
+
+    Raises
+    ------
+    ConfigurationError
+        For restitutions outside [0, 1], or an end before the start.
     """
 
     start: float = 1.75
     end: float = math.inf
     restitution: float = 0.9
     wall_restitution: float = 0.95
+
+    def __post_init__(self) -> None:
+        check_restitution(restitution=self.restitution, wall_restitution=self.wall_restitution)
+        if not self.end > self.start >= 0.0:
+            raise ConfigurationError(
+                'statistics',
+                f'from {self.start:g} to {self.end:g} s',
+                'give an end after the start, and a start from 0 s on',
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,18 +135,12 @@ def tray_statistics(
 
     Raises
     ------
-    ConfigurationError
-        For restitutions outside [0, 1], or an end before the start.
     FitError
         When no beads move measurably in the part of the cycles that is used.
     SimulationError
         When the beads of the tray do not fit into it.
     """
     choices = choices or GasChoices()
-    if not choices.end > choices.start >= 0.0:
-        raise ConfigurationError(
-            'statistics', f'from {choices.start:g} to {choices.end:g} s', 'give an end after it'
-        )
     kinds = range(len(tray.species))
     cycles = split_cycles(tracks, choices.start, choices.end)
     samples = sample_velocities(cycles, len(tray.species))
@@ -177,8 +186,6 @@ def _collisions(
     try:
         theory = theory_rates(confined_gas(tray), choices.restitution, choices.wall_restitution)
     except (ConfigurationError, FitError) as error:
-        if not 0.0 <= min(choices.restitution, choices.wall_restitution) <= 1.0:
-            raise
         notice = f'tray {tray.number}: no collision rates: {error}'
         return tuple(None for _ in tray.species), (notice,)
     rates = tuple(
