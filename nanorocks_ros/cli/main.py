@@ -37,6 +37,7 @@ COMMANDS = {
     'salvage': 'recordings.salvage',
     'simulate': 'simulation.simulate',
     'speeds': 'speeds',
+    'statistics': 'statistics',
     'sweep': 'simulation.sweep',
     'track': 'track',
 }

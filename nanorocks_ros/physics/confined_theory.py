@@ -238,6 +238,37 @@ class ConfinedGas:
         pairs = (self.contacts.pairs * spread).sum(axis=-1) * (0.5 * _MEAN)
         return pairs, _MEAN * self.contacts.walls * np.sqrt(granular_temperature)
 
+    def velocity_relaxation(
+        self, granular_temperature: NDArray[np.float64], restitution: float
+    ) -> NDArray[np.float64]:
+        """Rate at which bead collisions take a bead's velocity, (n, 3), [1/s].
+
+        -<v_i dv_i/dt> / <v_i^2> of each class along each axis: what the autocorrelation of the
+        velocity falls by at first. Rebounds from walls are not in it.
+
+        Parameters
+        ----------
+        granular_temperature : ndarray (n, 3), [m^2/s^2]
+        restitution : float, [0, 1]
+
+        Raises
+        ------
+        ConfigurationError
+            For a restitution outside [0, 1].
+        """
+        check_restitution(restitution=restitution)
+        spread, squares = self._approach(granular_temperature), self.contacts.squares
+        weighted = self.contacts.pairs * spread * self._partner_shares()
+        summed = np.einsum('abq,abqi->ai', weighted, squares)
+        rates: NDArray[np.float64] = _MEAN * (1.0 + restitution) * summed
+        return rates
+
+    def _partner_shares(self) -> NDArray[np.float64]:
+        """Mass of the second bead over that of both, (n, n, 1)."""
+        masses = self.beads.masses
+        shares: NDArray[np.float64] = (masses / (masses[:, np.newaxis] + masses))[..., np.newaxis]
+        return shares
+
     def _approach(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
         """Standard deviation of the relative velocity along each direction, (n, n, ...)."""
         sums = temperature[:, np.newaxis] + temperature
@@ -253,8 +284,7 @@ class ConfinedGas:
         width: float = 0.0,
     ) -> NDArray[np.float64]:
         """Rates of change of ln T, (n, 3), [1/s]; derived in docs/method/theory.md."""
-        masses = self.beads.masses
-        share = (masses / (masses[:, np.newaxis] + masses))[..., np.newaxis]
+        share = self._partner_shares()
         kick, kick_squared = 1.0 + restitution, (1.0 + restitution) ** 2 + width**2 / 12.0
         spread, squares = self._approach(temperature), self.contacts.squares
         weighted = self.contacts.pairs * spread * share

@@ -260,3 +260,32 @@ def test_a_bead_that_cannot_move_is_refused():
 def test_temperatures_of_the_wrong_shape_are_refused():
     with pytest.raises(ConfigurationError, match='three positive numbers'):
         gas(1).speeds(TIMES, 0.9, 0.99, np.ones(3))
+
+
+@pytest.mark.parametrize('restitution', [0.5, 0.9])
+def test_equal_beads_lose_one_plus_restitution_of_their_velocity_in_each_collision(restitution):
+    """Summed over the axes and relative to the mean square of each, with any temperatures.
+
+    A collision takes (1 + e) / 2 of the relative velocity along the line of centres from a bead.
+    """
+    temperature = np.array([[2e-5, 1.5e-5, 0.8e-5]])
+    relaxation = gas(1).velocity_relaxation(temperature, restitution)
+    rate = gas(1).collision_rates(temperature)[0].sum()
+    assert relaxation.shape == (1, 3)
+    assert relaxation.sum() == pytest.approx((1.0 + restitution) * rate)
+    # Beads collide almost side by side in a flat tray.
+    assert relaxation[0, 2] < 0.5 * relaxation[0, 0]
+
+
+def test_light_beads_lose_more_of_their_velocity():
+    relaxation = gas(5).velocity_relaxation(np.full((gas(5).beads.counts.size, 3), 1e-5), 0.9)
+    masses = gas(5).beads.masses
+    per_collision = relaxation.sum(axis=1) / gas(5).collision_rates(
+        np.full((masses.size, 3), 1e-5)
+    )[0].sum(axis=1)
+    assert (np.diff(per_collision[np.argsort(masses)]) < 0.0).all()
+
+
+def test_a_relaxation_needs_a_possible_restitution():
+    with pytest.raises(ConfigurationError, match='restitution'):
+        gas(1).velocity_relaxation(np.full((1, 3), 1e-5), 1.5)

@@ -1,0 +1,207 @@
+"""Figure of the statistics of the gas in one tray.
+
+Tested by ``test/studies/gas_statistics/test_tray_statistics.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+
+from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.studies.gas_statistics.velocity_distribution import EDGES, sonine_density
+
+mpl.use('Agg')
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from nanorocks_ros.records import Measured
+    from nanorocks_ros.studies.gas_statistics.tray_statistics import TrayStatistics
+
+_MM, _NANOJOULE = 1e3, 1e9
+_SIZE, _DPI = (13.0, 8.0), 110
+_COLOURS = ('#2166ac', '#c23b22', '#1b7837')
+_REFERENCE = '#8a8a8a'
+_LEAST_DENSITY = 1e-3
+# Limit of the axis of pair correlations: clusters have far higher first peaks.
+_HIGHEST_PAIRS = 4.0
+
+
+def statistics_figure(path: Path, statistics: TrayStatistics) -> None:
+    """Draw energies, velocities, collisions, pairs, structure and clustering of a tray.
+
+    Parameters
+    ----------
+    path : Path
+        ``.png``; a file there is replaced.
+    statistics : TrayStatistics
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be written.
+    """
+    figure = Figure(figsize=_SIZE, layout='constrained')
+    panels = figure.subplots(2, 3)
+    figure.suptitle(
+        f'tray {statistics.tray.number}: {len(statistics.cycles)} '
+        f'{"cycle" if len(statistics.cycles) == 1 else "cycles"}, {statistics.seconds:.0f} s',
+        fontsize=11,
+    )
+    drawings = (_energies, _velocities, _collisions, _pairs, _structure, _clustering)
+    for axes, draw in zip(panels.flat, drawings, strict=True):
+        draw(axes, statistics)
+        axes.grid(alpha=0.25)
+        if axes.get_yscale() == 'log' and draw is not _velocities:
+            axes.yaxis.set_major_formatter('{x:g}')
+            axes.yaxis.set_minor_formatter('{x:g}')
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(frameon=False, fontsize=8)
+    with atomic_file(path) as file:
+        figure.savefig(file, dpi=_DPI)
+
+
+def _text(measured: Measured, digits: int = 2) -> str:
+    if not math.isfinite(measured.error):
+        return f'{measured.value:.{digits}f}'
+    return f'{measured.value:.{digits}f} ± {measured.error:.{digits}f}'
+
+
+def _energies(axes: Axes, statistics: TrayStatistics) -> None:
+    for kind, part in enumerate(statistics.temperatures):
+        name = statistics.tray.species[kind].material
+        ratio = f', {_text(statistics.energy_ratios[kind])} of the first' if kind else ''
+        axes.errorbar(
+            part.time,
+            _NANOJOULE * part.energy,
+            yerr=_NANOJOULE * part.energy_error,
+            fmt='o',
+            ms=3.5,
+            lw=0.8,
+            color=_COLOURS[kind],
+            label=name + ratio,
+        )
+    axes.set_yscale('log')
+    axes.set_xlabel('time since the shaking event [s]')
+    axes.set_ylabel('energy of a bead in x and y [nJ]')
+
+
+def _velocities(axes: Axes, statistics: TrayStatistics) -> None:
+    middles, fine = 0.5 * (EDGES[:-1] + EDGES[1:]), np.linspace(EDGES[0], EDGES[-1], 301)
+    axes.plot(fine, sonine_density(fine, 0.0), color=_REFERENCE, lw=3, alpha=0.6, label='Maxwell')
+    for kind, shape in enumerate(statistics.velocities):
+        if shape is None:
+            continue
+        name = statistics.tray.species[kind].material
+        axes.errorbar(
+            middles,
+            np.where(shape.density > 0.0, shape.density, np.nan),
+            yerr=shape.density_error,
+            fmt='o',
+            ms=3.0,
+            lw=0.8,
+            color=_COLOURS[kind],
+            label=f'{name}: a2 {_text(shape.fourth_cumulant)}, '
+            f'anisotropy {_text(shape.anisotropy)}',
+        )
+        sonine = sonine_density(fine, shape.fourth_cumulant.value)
+        axes.plot(fine, np.where(sonine > 0.0, sonine, np.nan), color=_COLOURS[kind], lw=1)
+    axes.set_yscale('log')
+    axes.set_ylim(_LEAST_DENSITY, 2.0)
+    axes.set_xlabel('component of velocity / its root mean square')
+    axes.set_ylabel('probability density')
+
+
+def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
+    for kind, rate in enumerate(statistics.collisions):
+        if rate is None:
+            continue
+        name = statistics.tray.species[kind].material
+        part = statistics.temperatures[kind]
+        axes.errorbar(
+            part.time,
+            rate.per_path.value * part.mean_projected_speed,
+            yerr=rate.per_path.error * part.mean_projected_speed,
+            fmt='o',
+            ms=3.5,
+            lw=0.8,
+            color=_COLOURS[kind],
+            label=f'{name}: mean free path {_MM * rate.mean_free_path.value:.2f} ± '
+            f'{_MM * rate.mean_free_path.error:.2f} mm',
+        )
+        order = np.argsort(part.time)
+        axes.plot(
+            part.time[order],
+            rate.theory_per_path * part.mean_projected_speed[order],
+            color=_COLOURS[kind],
+            lw=1,
+            label=f'theory: {_MM * rate.theory_mean_free_path:.2f} mm',
+        )
+    axes.set_yscale('log')
+    axes.set_xlabel('time since the shaking event [s]')
+    axes.set_ylabel('collisions of a bead with others [1/s]')
+
+
+def _pairs(axes: Axes, statistics: TrayStatistics) -> None:
+    axes.axhline(1.0, color=_REFERENCE, lw=1)
+    highest = 0.0
+    for pair, colour in zip(statistics.pairs, _COLOURS, strict=False):
+        names = ' and '.join(statistics.tray.species[kind].material for kind in pair.species)
+        distance = _MM * pair.distance
+        axes.fill_between(
+            distance, pair.value - pair.error, pair.value + pair.error, color=colour, alpha=0.25
+        )
+        axes.plot(distance, pair.value, color=colour, lw=1.2, label=names)
+        axes.plot(distance, pair.random, ':', color=colour, lw=1)
+        highest = max(highest, 1.1 * float(np.nanmax(pair.value, initial=0.0)))
+    axes.set_ylim(0.0, min(max(highest, 1.5), _HIGHEST_PAIRS))
+    axes.set_xlabel('projected distance r [mm]')
+    axes.set_ylabel('g(r); dotted: random places')
+
+
+def _structure(axes: Axes, statistics: TrayStatistics) -> None:
+    factor = statistics.structure
+    axes.axhline(1.0, color=_REFERENCE, lw=1)
+    axes.errorbar(
+        factor.wave_number / _MM,
+        factor.value,
+        yerr=factor.error,
+        fmt='o',
+        ms=3.5,
+        lw=0.8,
+        color=_COLOURS[0],
+        label='all beads',
+    )
+    axes.plot(factor.wave_number / _MM, factor.random, ':', color=_COLOURS[0], label='random')
+    axes.set_ylim(0.0, None)
+    axes.set_xlabel('wave number k [1/mm]')
+    axes.set_ylabel('S(k)')
+
+
+def _clustering(axes: Axes, statistics: TrayStatistics) -> None:
+    reference = statistics.clustering[0]
+    axes.axhspan(
+        reference.random - reference.random_deviation,
+        reference.random + reference.random_deviation,
+        color=_REFERENCE,
+        alpha=0.25,
+        lw=0,
+        label='random places',
+    )
+    onsets = [cycle.onset for cycle in statistics.clustering if math.isfinite(cycle.onset)]
+    for cycle in statistics.clustering:
+        axes.plot(cycle.time, cycle.value, 'o-', ms=3.0, lw=0.8, color=_COLOURS[0], alpha=0.7)
+    for onset in onsets:
+        axes.axvline(onset, color=_COLOURS[1], lw=1)
+    found = f'clustering from {min(onsets):.1f} s on' if onsets else 'no clustering'
+    axes.set_title(found, fontsize=10)
+    axes.set_ylim(0.0, None)
+    axes.set_xlabel('time since the shaking event [s]')
+    axes.set_ylabel('S of the long waves')
