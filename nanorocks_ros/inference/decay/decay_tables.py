@@ -53,13 +53,16 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
     wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_NODES) ** (1.0 / WALL_POWER)
     beads, walls = (axis.ravel() for axis in np.meshgrid(restitution, wall, indexing='ij'))
     mean = library.log_speed(beads, walls)
-    slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
+    slope, shift = _floor_and_lid(library, beads, walls, settings.floor_lid_spread, mean)
+    slopes, shifts = [slope], shift
     for number, spread in enumerate(_spreads(tray, settings)):
         change = np.zeros((beads.size, len(NUISANCES)))
         change[:, number] = UNITS[number]
         high = library.log_speed(beads, walls, None, change)
         low = library.log_speed(beads, walls, None, -change)
-        slopes.append(0.5 * (high - low) * spread / UNITS[number])
+        share = spread / UNITS[number]
+        slopes.append(0.5 * (high - low) * share)
+        shifts += (0.5 * (high + low) - mean) * share**2
     smooth_slopes = np.stack(slopes, axis=1)
     corners, shares = _corners(library, beads, walls)
     rough = [
@@ -70,14 +73,15 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         decays=library,
         restitution=restitution,
         wall_restitution=wall,
-        mean=_smooth(mean),
+        mean=_smooth(mean + shifts),
         slopes=_smooth(smooth_slopes),
         corners=corners,
         shares=shares,
+        start=(math.log(settings.initial_speed), settings.initial_speed_spread),
         rough=tuple(
             RoughTables(
                 friction=friction,
-                mean=_smooth(rubbed),
+                mean=_smooth(rubbed + shifts),
                 slopes=_smooth(np.concatenate((smooth_slopes, by_beads), axis=1)),
             )
             for friction, (rubbed, by_beads) in zip(FRICTIONS, rough, strict=False)
@@ -130,13 +134,18 @@ def _floor_and_lid(
     beads: NDArray[np.float64],
     walls: NDArray[np.float64],
     spread: float,
-) -> NDArray[np.float64]:
-    """Change of ln f when the loss at floor and lid is exp(spread) times that at the sides."""
+    mean: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Change of ln f when the loss at floor and lid is exp(spread) times that at the sides.
+
+    And its mean change for a standard deviation of `spread`.
+    """
     if spread == 0.0:
-        return np.zeros((beads.size, library.distances.size))
+        return np.zeros_like(mean), np.zeros_like(mean)
     more, less = (1.0 - (1.0 - walls) * math.exp(logarithm) for logarithm in (spread, -spread))
     high = library.log_speed(beads, walls, more)
-    return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
+    low = library.log_speed(beads, walls, less)
+    return 0.5 * (high - low), 0.5 * (high + low) - mean
 
 
 def _corners(
