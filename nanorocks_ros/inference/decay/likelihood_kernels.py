@@ -61,8 +61,8 @@ def evaluate(
     axis : tuple of 2 floats
         Logarithm of the first distance of the library, and its step.
     results : tuple of 3 ndarrays
-        Log likelihood, deviation and start of `DecayLikelihood`, (n_places, 3); gradient, (n_places, n_z + 3), and
-        information, (n_places, n_z + 3, n_z + 3): empty if not needed.
+        Log likelihood, deviation and start of `DecayLikelihood`, (n_places, 3); gradient,
+        (n_places, n_z + 3), and information, (n_places, n_z + 3, n_z + 3): empty if not needed.
     """
     log_time, log_speed, variance = data
     numbers, gradients, informations = results
