@@ -28,5 +28,6 @@ def test_true_restitutions_of_beads_have_a_mean_rank_of_one_half_in_their_poster
             deviations.append(rank - 0.5 - by_truth)
     error = np.std(deviations) / math.sqrt(len(deviations))
     assert error < 0.012
-    # With the best initial speed in place of the integral over it the mean is -0.05.
+    # With the best initial speed, near the first one measured, in place of the integral with its
+    # prior, and with the library at the expected nuisances alone, the mean is -0.05.
     assert abs(np.mean(deviations)) < 0.03

@@ -2,11 +2,11 @@
 
 A decay is a series of ln v with errors. Against the mean ln f of the library, the deviations of
 the gas from its mean have the library's covariance, and the errors of the speeds add to it. The
-amplitude a in v(t) = a f(a t), which holds exactly, has a prior; the best a is computed at each
-point of the grid by Newton's method, and the integral over ln a is that of a Gaussian around it.
-Without that integral restitutions read high, since a gas that loses much energy soon loses the
-memory of its initial speed, so that a larger share of its initial speeds agrees with a decay.
-Cycles start alike, so that the start of many counts once. The nuisances of tray and camera stay
+amplitude a in v(t) = a f(a t), which holds exactly, has a prior that does not depend on the decay;
+the best a is computed at each point of the grid by Newton's method, and the integral over ln a is
+that of a Gaussian around it: a gas that loses much energy soon loses the memory of its initial
+speed, so that a larger share of its initial speeds agrees with a decay. With a prior around the
+first speed measured, and without the integral, restitutions of beads read 0.03 high. Cycles start alike, so that the start of many counts once. The nuisances of tray and camera stay
 free: the result holds the dependence of the likelihood on them to second order, so that many
 decays of one tray can be added before the integration over the nuisances, which, unlike noise, do
 not average out.
