@@ -6,10 +6,11 @@ amplitude a in v(t) = a f(a t), which holds exactly, has a prior that does not d
 the best a is computed at each point of the grid by Newton's method, and the integral over ln a is
 that of a Gaussian around it: a gas that loses much energy soon loses the memory of its initial
 speed, so that a larger share of its initial speeds agrees with a decay. With a prior around the
-first speed measured, and without the integral, restitutions of beads read 0.03 high. Cycles start alike, so that the start of many counts once. The nuisances of tray and camera stay
-free: the result holds the dependence of the likelihood on them to second order, so that many
-decays of one tray can be added before the integration over the nuisances, which, unlike noise, do
-not average out.
+first speed measured, and without the integral, restitutions of beads read 0.03 high. Cycles start
+alike, so that the width of the starts that agree counts once for many. The nuisances of tray and camera stay free: the
+result holds the dependence of the likelihood on them to second order, so that many decays of one
+tray can be added before the integration over the nuisances, which, unlike noise, do not average
+out.
 """
 
 from __future__ import annotations
@@ -116,9 +117,9 @@ class DecayLikelihood:
     Parameters
     ----------
     log_likelihood : ndarray (n_places,)
-        At the expected nuisances and the best amplitude.
+        At the expected nuisances and the best amplitude, with the prior of that.
     start : ndarray (n_places,)
-        What the integral over the amplitude, with its prior, adds to it.
+        What the integral over the amplitude adds to it.
     gradient : ndarray (n_places, n_z)
         Its derivative by the nuisances, in units of their standard deviations.
     information : ndarray (n_places, n_z, n_z)
@@ -193,8 +194,7 @@ class DecayLikelihood:
             np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
             log_likelihood.reshape(-1),
         )
-        # Cycles start alike: for each of many to have a start of its own, from the whole prior,
-        # would favour restitutions at which starts are forgotten.
+        # Cycles start alike: a sum over many would favour restitutions at which starts are forgotten.
         log_likelihood += self.log_likelihood + self.start / max(self.decays, 1)
         if log_likelihood.ndim == 1:
             return np.asarray(log_likelihood)

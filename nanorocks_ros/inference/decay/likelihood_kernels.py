@@ -107,7 +107,7 @@ def evaluate(
         _sum_up(
             columns, (deviation, spread), numbers[place], gradients[place], informations[place]
         )
-        numbers[place, 0] -= 0.5 * log_determinant
+        numbers[place, 0] -= 0.5 * (log_determinant + deviation * deviation)
 
 
 @kernel
@@ -328,4 +328,4 @@ def _sum_up(
         gradient[z] = slope - gradient[z] * pull / stiffness
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation
-    numbers[2] = -0.5 * (off * off + math.log(stiffness * spread**2))
+    numbers[2] = -0.5 * math.log(stiffness * spread**2)
