@@ -38,7 +38,8 @@ def varied(
     )
     length, width, height = tray.dimensions
     height += prior.height_error * random.standard_normal()
-    loss = (1.0 - wall) * math.exp(prior.floor_lid_spread * random.standard_normal())
+    # Floor and lid cannot lose more than everything.
+    loss = min((1.0 - wall) * math.exp(prior.floor_lid_spread * random.standard_normal()), 1.0)
     values: dict[str, float | str] = {
         'vertical_speed_factor': math.exp(prior.anisotropy_spread * random.standard_normal()),
         'speeds': 'maxwellian' if random.random() < 0.5 else 'uniform',

@@ -1,11 +1,12 @@
 """Simulation-based calibration: ranks of true restitutions in their posteriors.
 
-Truths are drawn from the priors of the inference: beads 0 to 1, walls 0.78 to 1, tray, floor and
+Truths are drawn from the priors of the inference: beads 0 to 1, walls 0.5 to 1, tray, floor and
 lid, initial speeds, scale and bias of the speeds; each gives one cycle of 20 s. In a right
 posterior the rank of the truth, the probability below it, is uniform from 0 to 1
 (Talts et al. 2018, arXiv:1804.06788). "Decay": true mean speeds with errors of 2 %. "All": with
 contacts in true tracks with the errors of tracking. Results are kept (`filmed_cycles.folder`)
-under a key of the source code: a command that was interrupted continues.
+under a key of the source code: a command that was interrupted continues. The decays have a key of
+the code that simulates, so that after a change of the inference only that is repeated.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import math
 import pickle
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,7 +40,11 @@ from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_value
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
 
 _TRAYS = (1, 3, 5)
 _CONTACT_TRAYS = (1, 3)
@@ -50,11 +56,30 @@ _RATE = 30.0
 # Mean projected over mean speed of an isotropic gas.
 _PROJECTED = 0.25 * math.pi
 _BINS = 20
-# Mean projected speed at the start, [m/s]: median, and standard deviation of its logarithm.
-_START, _START_SPREAD = 0.007, 0.7
 _SHARES = (0.68, 0.95)
 # The walls have the prior of the decay: no others were simulated for the library.
 _PRIOR = PriorSettings(min_wall_restitution=LOWEST_WALL)
+# Folders with the code that simulates.
+_SIMULATING = ('experiment', 'numerics', 'settings', 'simulation')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cycle:
+    """A drawn truth and its decay.
+
+    Parameters
+    ----------
+    tray : Tray
+        With drawn sides and beads.
+    simulation : SimulationSettings
+        With the true restitutions.
+    speed : ndarray (n_times,), [m/s]
+        Mean projected speeds with the errors that the inference assumes.
+    """
+
+    tray: Tray
+    simulation: SimulationSettings
+    speed: NDArray[np.float64]
 
 
 def report() -> None:
@@ -86,29 +111,54 @@ def judged(ranks: NDArray[np.float64]) -> str:
     return ' | '.join(cells)
 
 
-def ranks_of_decays(tray_number: int, numbers: range) -> NDArray[np.float64]:
-    """Ranks of beads and walls in posteriors of the decay alone, (n, 2).
+def _ranks_of_decays(tray_number: int, numbers: range) -> NDArray[np.float64]:
+    return np.array([ranks_of(tray_number, cycle) for cycle in _cycles(tray_number, numbers)])
+
+
+def _ranks_with_contacts(tray_number: int, numbers: range) -> NDArray[np.float64]:
+    ranks = []
+    for number, cycle in zip(numbers, _cycles(tray_number, numbers), strict=True):
+        frames = round(_TIMES[-1] * _RATE)
+        tracks = true_tracks(cycle.tray, cycle.simulation, number, frames)
+        contacts = contacts_of(load_trays()[tray_number], tracks)
+        terms = ContactTerms.of(
+            [contact for contact in contacts if contact.stamp_ns >= _TIMES[0] * NS]
+        )
+        ranks.append(ranks_of(tray_number, cycle, terms))
+    return np.array(ranks)
+
+
+def _cycles(tray_number: int, numbers: range) -> list[Cycle]:
+    """Simulated cycles, from a file where there is one."""
+    path = (
+        folder()
+        / f'decays_{_simulation_key()}'
+        / f'{tray_number}_{numbers.start}_{numbers.stop}.pickle'
+    )
+    if path.exists():
+        cycles: list[Cycle] = pickle.loads(path.read_bytes())
+        return cycles
+    cycles = [drawn_cycle(tray_number, number) for number in numbers]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, pickle.dumps(cycles))
+    return cycles
+
+
+def drawn_cycle(tray_number: int, number: int) -> Cycle:
+    """Draw a truth from the priors and simulate its decay.
 
     Parameters
     ----------
     tray_number : int
-    numbers : range
-        Of the drawn truths.
+    number : int
+        Of the truth.
     """
-    return np.array([_rank(tray_number, number, with_contacts=False) for number in numbers])
-
-
-def _ranks_with_contacts(tray_number: int, numbers: range) -> NDArray[np.float64]:
-    return np.array([_rank(tray_number, number, with_contacts=True) for number in numbers])
-
-
-def _rank(tray_number: int, number: int, *, with_contacts: bool) -> tuple[float, float]:
     tray = load_trays()[tray_number]
     random = np.random.default_rng([2026, tray_number, number])
     beads = random.uniform()
     walls = random.uniform(_PRIOR.min_wall_restitution, _PRIOR.max_wall_restitution)
     drawn, values = varied(tray, walls, _PRIOR, random)
-    start = _START * math.exp(_START_SPREAD * random.standard_normal())
+    start = _PRIOR.initial_speed * math.exp(_PRIOR.initial_speed_spread * random.standard_normal())
     simulation = with_values(
         SimulationSettings(seed=4343, first_shake=0.0, frame_rate=_RATE),
         {
@@ -120,26 +170,39 @@ def _rank(tray_number: int, number: int, *, with_contacts: bool) -> tuple[float,
         'benchmark',
     )
     (true,) = cooling_runs(simulation, drawn, _TIMES, [number]).mean_projected_speed
-    speed = _measured(true, random)
+    return Cycle(tray=drawn, simulation=simulation, speed=_measured(true, random))
+
+
+def ranks_of(
+    tray_number: int, cycle: Cycle, terms: ContactTerms | None = None
+) -> tuple[float, float]:
+    """Ranks of beads and walls in the posterior of one cycle.
+
+    Parameters
+    ----------
+    tray_number : int
+        Of the listed tray, which the inference assumes.
+    cycle : Cycle
+    terms : ContactTerms, optional
+        Of its contacts; without them the decay alone is used.
+    """
+    tray = load_trays()[tray_number]
     library = library_of(tray)
     tables = tables_of(library, tray, _PRIOR)
     camera = math.hypot(_PRIOR.scale_error, library.misfit), _PRIOR.speed_bias
-    decay = decay_likelihood(tables, _TIMES, speed, _ERROR * speed, camera).integrated()
-    terms = ContactTerms.of(())
-    if with_contacts:
-        frames = round(_TIMES[-1] * _RATE)
-        contacts = contacts_of(tray, true_tracks(drawn, simulation, number, frames))
-        terms = ContactTerms.of(
-            [contact for contact in contacts if contact.stamp_ns >= _TIMES[0] * NS]
-        )
+    terms = terms or ContactTerms.of(())
+    decay = decay_likelihood(
+        tables, _TIMES, cycle.speed, _ERROR * cycle.speed, camera, highest_friction=0.0
+    )
     posterior = posterior_of(
         tables,
-        decay,
+        decay.integrated(),
         (_PRIOR.min_wall_restitution, _PRIOR.max_wall_restitution),
         bead_likelihood=terms.bead_likelihood(_PRIOR.collision_bias),
         wall_likelihood=terms.wall_likelihood(_PRIOR.rebound_bias),
     )
-    return _below(posterior, beads, walls)
+    truth = cycle.simulation
+    return _below(posterior, truth.restitution, truth.wall_restitution)
 
 
 def _measured(true: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
@@ -174,7 +237,7 @@ def _all_ranks(kind: str, tray: int, number: int) -> NDArray[np.float64]:
 
 def _make(part: tuple[str, int, range]) -> None:
     kind, tray, numbers = part
-    ranks = ranks_of_decays if kind == 'decay' else _ranks_with_contacts
+    ranks = _ranks_of_decays if kind == 'decay' else _ranks_with_contacts
     path = _file(f'{kind}_{tray}_{numbers.start}')
     path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(path, pickle.dumps(ranks(tray, numbers)))
@@ -188,9 +251,23 @@ def _file(name: str) -> Path:
 def _code_key() -> str:
     """Key of the code that simulates and infers, and of the libraries."""
     here = Path(__file__).resolve().parent
-    files = sorted((here.parent / 'nanorocks_ros').rglob('*.py'))
-    files += sorted((here.parent / 'nanorocks_ros').rglob('*.npz'))
-    files += [here / name for name in ('ranks.py', 'drawn.py', 'contacts.py')]
+    package = here.parent / 'nanorocks_ros'
+    files = [*sorted(package.rglob('*.py')), *sorted(package.rglob('*.npz'))]
+    return _key([*files, *(here / name for name in ('ranks.py', 'drawn.py', 'contacts.py'))])
+
+
+@cache
+def _simulation_key() -> str:
+    here = Path(__file__).resolve().parent
+    files = [
+        file
+        for name in _SIMULATING
+        for file in sorted((here.parent / 'nanorocks_ros' / name).rglob('*.py'))
+    ]
+    return _key([*files, here / 'ranks.py', here / 'drawn.py'])
+
+
+def _key(files: Iterable[Path]) -> str:
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())

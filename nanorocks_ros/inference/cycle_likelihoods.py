@@ -147,10 +147,12 @@ def _decay_arrays(prefix: str, decay: DecayLikelihood) -> dict[str, NDArray[Any]
     upper = np.triu_indices(decay.gradient.shape[-1])
     return {
         f'{prefix}.log_likelihood': decay.log_likelihood,
+        f'{prefix}.start': decay.start,
         f'{prefix}.gradient': decay.gradient.astype(np.float32),
         f'{prefix}.information': decay.information[..., upper[0], upper[1]].astype(np.float32),
         f'{prefix}.deviation': decay.deviation,
         f'{prefix}.samples': np.array(decay.samples),
+        f'{prefix}.decays': np.array(decay.decays),
     }
 
 
@@ -163,10 +165,12 @@ def _decay_from(arrays: Mapping[str, NDArray[Any]], prefix: str) -> DecayLikelih
     information[..., upper[1], upper[0]] = half
     return DecayLikelihood(
         log_likelihood=arrays[f'{prefix}.log_likelihood'],
+        start=arrays[f'{prefix}.start'],
         gradient=gradient,
         information=information,
         deviation=arrays[f'{prefix}.deviation'],
         samples=int(arrays[f'{prefix}.samples']),
+        decays=int(arrays[f'{prefix}.decays']),
     )
 
 

@@ -135,6 +135,19 @@ class PriorSettings:
         low=0.0,
         high=2.0,
     )
+    initial_speed: float = setting(
+        7e-3,
+        'median of the mean projected speed after a shaking event, before the decay is seen',
+        'm/s',
+        low=1e-6,
+        high=10.0,
+    )
+    initial_speed_spread: float = setting(
+        0.7,
+        'standard deviation of the logarithm of the mean projected speed after a shaking event',
+        low=0.01,
+        high=5.0,
+    )
     friction: float = setting(
         0.0,
         'coefficient of friction of beads on floor, lid and walls, such as measured with spare '

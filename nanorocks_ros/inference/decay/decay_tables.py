@@ -53,26 +53,34 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
     wall = 1.0 - (1.0 - LOWEST_WALL) * np.linspace(1.0, 0.0, _WALL_NODES) ** (1.0 / WALL_POWER)
     beads, walls = (axis.ravel() for axis in np.meshgrid(restitution, wall, indexing='ij'))
     mean = library.log_speed(beads, walls)
-    slopes = [_floor_and_lid(library, beads, walls, settings.floor_lid_spread)]
+    slope, shift = _floor_and_lid(library, beads, walls, settings.floor_lid_spread, mean)
+    slopes, shifts = [slope], shift
     for number, spread in enumerate(_spreads(tray, settings)):
         change = np.zeros((beads.size, len(NUISANCES)))
         change[:, number] = UNITS[number]
         high = library.log_speed(beads, walls, None, change)
         low = library.log_speed(beads, walls, None, -change)
-        slopes.append(0.5 * (high - low) * spread / UNITS[number])
+        share = spread / UNITS[number]
+        slopes.append(0.5 * (high - low) * share)
+        shifts += (0.5 * (high + low) - mean) * share**2
     smooth_slopes = np.stack(slopes, axis=1)
     corners, shares = _corners(library, beads, walls)
     return DecayTables(
         decays=library,
         restitution=restitution,
         wall_restitution=wall,
-        mean=_smooth(mean),
+        mean=_smooth(mean + shifts),
         slopes=_smooth(smooth_slopes),
         corners=corners,
         shares=shares,
+        start=(math.log(settings.initial_speed), settings.initial_speed_spread),
         rough=tuple(
             _rough_tables(
-                library, beads, walls, friction, settings.bead_friction_spread, smooth_slopes
+                library,
+                (beads, walls),
+                friction,
+                settings.bead_friction_spread,
+                (shifts, smooth_slopes),
             )
             for friction in (FRICTIONS if library.rough else ())
         ),
@@ -81,13 +89,17 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
 
 def _rough_tables(
     library: DecayLibrary,
-    beads: NDArray[np.float64],
-    walls: NDArray[np.float64],
+    restitutions: tuple[NDArray[np.float64], NDArray[np.float64]],
     friction: float,
     spread: float,
-    smooth_slopes: NDArray[np.float64],
+    smooth: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> RoughTables:
-    """Decays with a friction of walls and beads, and their change with that of beads alone."""
+    """Decays with a friction of walls and beads, and their change with that of beads alone.
+
+    `smooth` is what the nuisances do to smooth beads: the change of the mean, and the slopes.
+    """
+    beads, walls = restitutions
+    shifts, smooth_slopes = smooth
 
     def log_speed(beads_over_walls: float) -> NDArray[np.float64]:
         point = np.zeros((beads.size, len(FRICTION)))
@@ -97,7 +109,7 @@ def _rough_tables(
     change = 0.5 * (log_speed(spread) - log_speed(-spread))
     return RoughTables(
         friction=friction,
-        mean=_smooth(log_speed(0.0)),
+        mean=_smooth(log_speed(0.0) + shifts),
         slopes=_smooth(np.concatenate((smooth_slopes, change[:, np.newaxis]), axis=1)),
     )
 
@@ -129,13 +141,18 @@ def _floor_and_lid(
     beads: NDArray[np.float64],
     walls: NDArray[np.float64],
     spread: float,
-) -> NDArray[np.float64]:
-    """Change of ln f when the loss at floor and lid is exp(spread) times that at the sides."""
+    mean: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Change of ln f when the loss at floor and lid is exp(spread) times that at the sides.
+
+    And its mean change for a standard deviation of `spread`.
+    """
     if spread == 0.0:
-        return np.zeros((beads.size, library.distances.size))
+        return np.zeros_like(mean), np.zeros_like(mean)
     more, less = (1.0 - (1.0 - walls) * math.exp(logarithm) for logarithm in (spread, -spread))
     high = library.log_speed(beads, walls, more)
-    return np.asarray(0.5 * (high - library.log_speed(beads, walls, less)))
+    low = library.log_speed(beads, walls, less)
+    return 0.5 * (high - low), 0.5 * (high + low) - mean
 
 
 def _corners(

@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 _NEWTON_STEPS = 15
 _LONGEST_STEP, _SMALL = 0.5, 3e-3
-# Prior of the amplitude: the speed at the shaking event is 1.6 times the first speed used, with a
-# standard deviation of a factor of e, if that is within four seconds of the event. For a later
-# first speed both logarithms rise with that of its time.
-_AMPLITUDE_LEAD, _AMPLITUDE_SPREAD = 0.5, 1.0
-_EARLY, _LEAD_PER_LOG_TIME = math.log(4.0), 1.0
 # The search starts from the amplitude that matches the first speeds; largest ln of it over them.
 _MOST_LEAD = 8.0
 # Drag times the time in the clock without it: below the first it is negligible, and at 1 the gas
@@ -43,8 +38,8 @@ def evaluate(
     means: NDArray[np.float64],
     slopes: NDArray[np.float64],
     camera: NDArray[np.float64],
-    first: float,
-    step: float,
+    start: tuple[float, float],
+    axis: tuple[float, float],
     results: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
     """Compute the likelihood at every point of the grid, for its best amplitude.
@@ -61,14 +56,18 @@ def evaluate(
     means, slopes : ndarray (n_places, n_x), (n_places, n_z, n_x)
     camera : ndarray (4,)
         Standard deviations of scale and bias; drag and its standard deviation, [1/s].
-    first, step : float
+    start : tuple of 2 floats
+        Mean and standard deviation of ln a before the decay is seen.
+    axis : tuple of 2 floats
         Logarithm of the first distance of the library, and its step.
     results : tuple of 3 ndarrays
-        Log likelihood and deviation, (n_places, 2); gradient, (n_places, n_z + 3), and
-        information, (n_places, n_z + 3, n_z + 3): empty if not needed.
+        Log likelihood, deviation and start of `DecayLikelihood`, (n_places, 3); gradient,
+        (n_places, n_z + 3), and information, (n_places, n_z + 3, n_z + 3): empty if not needed.
     """
     log_time, log_speed, variance = data
     numbers, gradients, informations = results
+    first, step = axis
+    expected, spread = start
     n = log_time.size
     n_z = slopes.shape[1] + 3
     mixed = np.empty(covariances.shape[1:])
@@ -76,9 +75,6 @@ def evaluate(
     # Columns: residual, derivative with ln a, then the nuisances; whitened in place.
     columns = np.empty((2 + n_z, n))
     middle = log_speed.mean()
-    late = _LEAD_PER_LOG_TIME * max(log_time[0] - _EARLY, 0.0)
-    expected = log_speed[0] + _AMPLITUDE_LEAD + late
-    spread = _AMPLITUDE_SPREAD + late
     for place in range(means.shape[0]):
         amplitude = _matching(log_time, log_speed, means[place], first, step)
         # Beyond the ends of the library the covariance is that of its ends.
@@ -94,7 +90,7 @@ def evaluate(
             factor[i, i] += variance[i]
         log_determinant = factorise(factor)
         best, cost = _best_amplitude(
-            data, means[place], (first, step), factor, (amplitude, expected, spread), columns
+            data, means[place], axis, factor, (amplitude, expected, spread), columns
         )
         deviation = (best - expected) / spread
         if gradients.shape[0] == 0:
@@ -332,3 +328,4 @@ def _sum_up(
         gradient[z] = slope - gradient[z] * pull / stiffness
     numbers[0] = -0.5 * deviation
     numbers[1] = deviation
+    numbers[2] = -0.5 * math.log(stiffness * spread**2)

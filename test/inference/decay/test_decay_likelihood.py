@@ -29,10 +29,12 @@ def test_nuisances_are_integrated_over_as_by_a_determinant_and_an_inverse():
     half = rng.normal(size=(30, 8, 5)) * np.geomspace(0.1, 30.0, 30)[:, np.newaxis, np.newaxis]
     likelihood = DecayLikelihood(
         log_likelihood=rng.normal(size=30),
+        start=np.zeros(30),
         gradient=rng.normal(0.0, 3.0, (30, 8)),
         information=half @ half.swapaxes(1, 2),
         deviation=np.zeros(30),
         samples=5,
+        decays=1,
     )
     expected = []
     for log, gradient, information in zip(
