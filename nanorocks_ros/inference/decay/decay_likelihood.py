@@ -2,15 +2,16 @@
 
 A decay is a series of ln v with errors. Against the mean ln f of the library, the deviations of
 the gas from its mean have the library's covariance, and the errors of the speeds add to it. The
-amplitude a in v(t) = a f(a t), which holds exactly, has a prior that does not depend on the decay;
-the best a is computed at each point of the grid by Newton's method, and the integral over ln a is
-that of a Gaussian around it: a gas that loses much energy soon loses the memory of its initial
-speed, so that a larger share of its initial speeds agrees with a decay. With a prior around the
-first speed measured, and without the integral, restitutions of beads read 0.03 high. Cycles start
-alike, so that the width of the starts that agree counts once for many. The nuisances of tray and camera stay free: the
-result holds the dependence of the likelihood on them to second order, so that many decays of one
-tray can be added before the integration over the nuisances, which, unlike noise, do not average
-out.
+amplitude a in v(t) = a f(a t), which holds exactly, has a prior, which is widened where the first
+speeds are far off it; the best a is computed at each point of the grid by Newton's method, and the
+integral over ln a is that of a Gaussian around it: a gas that loses much energy soon loses the
+memory of its initial speed, so that a larger share of its initial speeds agrees with a decay. With
+a prior around the first speed measured, and without the integral, restitutions of beads read 0.03
+high. Cycles start alike, so that the width of the starts that agree counts once for many.
+
+The nuisances of tray and camera stay free: the result holds the dependence of the likelihood on
+them to second order, so that many decays of one tray can be added before the integration over the
+nuisances, which, unlike noise, do not average out.
 """
 
 from __future__ import annotations
@@ -194,7 +195,7 @@ class DecayLikelihood:
             np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
             log_likelihood.reshape(-1),
         )
-        # Cycles start alike: a sum over many would favour restitutions at which starts are forgotten.
+        # Cycles start alike: a sum over many would favour restitutions that forget their starts.
         log_likelihood += self.log_likelihood + self.start / max(self.decays, 1)
         if log_likelihood.ndim == 1:
             return np.asarray(log_likelihood)

@@ -21,6 +21,9 @@ _NEWTON_STEPS = 15
 _LONGEST_STEP, _SMALL = 0.5, 3e-3
 # The search starts from the amplitude that matches the first speeds; largest ln of it over them.
 _MOST_LEAD = 8.0
+# The speed at the start over the first speed that is seen, its logarithm; and standard deviations
+# of the prior by which it may be off before the prior is widened by the rest.
+_LEAD, _SURPRISE = 0.5, 2.0
 # Drag times the time in the clock without it: below the first it is negligible, and at 1 the gas
 # has come to rest.
 _NEARLY_STRAIGHT, _MOST_DRAGGED = 1e-4, 1.0 - 1e-9
@@ -57,7 +60,8 @@ def evaluate(
     camera : ndarray (4,)
         Standard deviations of scale and bias; drag and its standard deviation, [1/s].
     start : tuple of 2 floats
-        Mean and standard deviation of ln a before the decay is seen.
+        Mean and standard deviation of ln a before the decay is seen; wider where the first speeds
+        are far off.
     axis : tuple of 2 floats
         Logarithm of the first distance of the library, and its step.
     results : tuple of 3 ndarrays
@@ -68,6 +72,9 @@ def evaluate(
     numbers, gradients, informations = results
     first, step = axis
     expected, spread = start
+    # Films of other experiments have other speeds: a prior that is far off must not decide.
+    surprise = abs(log_speed[0] + _LEAD - expected) - _SURPRISE * spread
+    spread = math.hypot(spread, max(surprise, 0.0))
     n = log_time.size
     n_z = slopes.shape[1] + 3
     mixed = np.empty(covariances.shape[1:])

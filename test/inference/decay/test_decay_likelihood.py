@@ -11,6 +11,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import FRICTIONS, tables_of
+from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.records import Measured
 from nanorocks_ros.settings import PriorSettings
 
@@ -130,3 +131,23 @@ def test_the_gradient_by_the_drag_is_that_of_likelihoods_for_other_drags(tables,
     expected = slopes[best] - slopes[other]
     assert abs(expected) > 5.0
     assert gradient[best] - gradient[other] == pytest.approx(expected, rel=0.25)
+
+
+@pytest.mark.parametrize('faster', [1.0 / 30.0, 30.0])
+def test_a_film_of_other_speeds_than_expected_is_read_as_one_of_those(tables, faster):
+    beads, walls = np.meshgrid(tables.restitution, tables.wall_restitution, indexing='ij')
+    place = int(np.argmin(np.hypot(beads.ravel() - 0.6, walls.ravel() - 0.95)))
+    time = np.arange(1.75, 20.0, 0.25)
+    start = math.exp(tables.start[0])
+    distances = np.log(tables.decays.distances)
+    speed = start * np.exp(np.interp(np.log(start * time), distances, tables.mean[place]))
+
+    def restitution(time, speed):
+        decay = decay_likelihood(tables, time, speed, 0.02 * speed, (0.01, 0.01))
+        posterior = posterior_of(tables, decay.integrated(), (0.9, 1.0))
+        return posterior.quantiles(np.array([0.025, 0.5, 0.975]))
+
+    lower, value, upper = restitution(time, speed)
+    _, other, _ = restitution(time / faster, speed * faster)
+
+    assert abs(other - value) < 0.1 * (upper - lower)
