@@ -202,13 +202,17 @@ def _film_cells(final: CorEstimate | None) -> str:
         (
             seen,
             _interval(final.restitution_exponent, 2),
-            f'{1e3 * final.impact_speed:.2f}',
+            _speed(final.impact_speed),
             _interval(final.wall_restitution_exponent, 2),
-            f'{1e3 * final.wall_impact_speed:.2f}',
+            _speed(final.wall_impact_speed),
             _interval(final.restitution, 3),
             ', '.join(final.quality.names()),
         )
     )
+
+
+def _speed(speed: float) -> str:
+    return f'{1e3 * speed:.2f}' if math.isfinite(speed) else ''
 
 
 def _interval(interval: Interval, digits: int) -> str:
