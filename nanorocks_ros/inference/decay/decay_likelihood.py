@@ -7,10 +7,10 @@ the best a is computed at each point of the grid by Newton's method, and the int
 that of a Gaussian around it: a gas that loses much energy soon loses the memory of its initial
 speed, so that a larger share of its initial speeds agrees with a decay. With a prior around the
 first speed measured, and without the integral, restitutions of beads read 0.03 high. Cycles start
-alike, so that the width of the starts that agree counts once for many. The nuisances of tray and camera stay free: the
-result holds the dependence of the likelihood on them to second order, so that many decays of one
-tray can be added before the integration over the nuisances, which, unlike noise, do not average
-out.
+alike, so that the width of the starts that agree counts once for many. The nuisances of tray and
+camera stay free: the result holds the dependence of the likelihood on them to second order, so
+that many decays of one tray can be added before the integration over the nuisances, which, unlike
+noise, do not average out.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ class DecayLikelihood:
             np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
             log_likelihood.reshape(-1),
         )
-        # Cycles start alike: a sum over many would favour restitutions at which starts are forgotten.
+        # Cycles start alike: a sum over many would favour restitutions that forget their start.
         log_likelihood += self.log_likelihood + self.start / max(self.decays, 1)
         if log_likelihood.ndim == 1:
             return np.asarray(log_likelihood)
