@@ -51,6 +51,7 @@ ALL = (
     'friction_films',
     'drag',
     'sensitivity',
+    'gas_statistics',
     'engine',
     'engine_physics',
     'validation',
