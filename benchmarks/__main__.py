@@ -52,6 +52,7 @@ ALL = (
     'drag',
     'speed_dependence',
     'sensitivity',
+    'gas_statistics',
     'engine',
     'engine_physics',
     'validation',

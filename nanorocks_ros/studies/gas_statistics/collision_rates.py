@@ -49,8 +49,8 @@ _LEAST_BEADS = 10
 _MOST_TIMES = 20.0
 # Relative error of the form of f.
 _FORM_ERROR = 0.02
-# Relative error of theory's collisions per lost velocity, over 1 - restitution: in simulated gases
-# of tray 1 they scatter by 7 % at 0.89 and by 15 % at 0.7.
+# Relative error of theory's collisions per lost velocity, over 1 - restitution: at 0.7 runs of a
+# tray scatter by more than their blocks do.
 _MODEL_ERROR = 0.5
 
 

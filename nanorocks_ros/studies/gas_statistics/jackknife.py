@@ -42,7 +42,7 @@ def jackknife(
 
     Parameters
     ----------
-    sums : ndarray (n_blocks, ...)
+    sums : ndarray (n_blocks, n)
         Of each block; blocks without any are left out.
     function : callable
         From the sum over blocks to a number or an array.
@@ -52,7 +52,7 @@ def jackknife(
     value, error : ndarray
         The error is NaN with a single block.
     """
-    used = sums[np.any(sums != 0.0, axis=tuple(range(1, sums.ndim)))] if sums.ndim > 1 else sums
+    used = sums[np.any(sums != 0.0, axis=1)]
     total = used.sum(axis=0)
     value = np.asarray(function(total), dtype=np.float64)
     n = len(used)

@@ -1,4 +1,7 @@
-"""Granular temperature and energy of each species over time."""
+"""Granular temperature and energy of each species over time.
+
+Tested by ``test/studies/gas_statistics/test_velocity_samples.py``.
+"""
 
 from __future__ import annotations
 

@@ -13,13 +13,15 @@ from nanorocks_ros.studies.gas_statistics.jackknife import block_sums, jackknife
 from nanorocks_ros.studies.gas_statistics.velocity_samples import FOURTH, PAIR, XX, XY, YY
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.studies.gas_statistics.velocity_samples import VelocitySamples
 
 EDGES = np.linspace(-5.0, 5.0, 41)
 """Edges of the bins of the histogram, in thermal speeds."""
-# Frames in which velocities are scaled alike: over a second the weights hardly vary.
+# Frames that are weighted alike: speeds hardly change in a second.
 _RUNNING = 30
 
 
@@ -101,13 +103,15 @@ def sonine_density(component: NDArray[np.float64], fourth_cumulant: float) -> ND
     return density
 
 
-def _measured(sums: NDArray[np.float64], function: object) -> Measured:
-    value, error = jackknife(sums, function)  # type: ignore[arg-type]
+def _measured(
+    sums: NDArray[np.float64], function: Callable[[NDArray[np.float64]], float]
+) -> Measured:
+    value, error = jackknife(sums, function)
     return Measured(float(value), float(error))
 
 
 def _smooth(square: NDArray[np.float64], block: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Running mean over about a second, not across blocks' cycles: only weights, not values."""
+    """Mean over about a second, within a block: the scale of the weights."""
     smooth = np.empty_like(square)
     for number in np.unique(block):
         own = np.flatnonzero(block == number)
