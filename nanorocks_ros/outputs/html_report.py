@@ -165,4 +165,19 @@ def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
     """A number for a cell of a table; a dash where it is not known."""
     if value is None or not math.isfinite(value):
         return '–'
-    return f'{factor * value:.{digits}g}'
+    text = f'{factor * value:.{digits}g}'
+    return f'{float(text):.0f}' if 'e+' in text else text
+
+
+def with_error(value: float, error: float, factor: float = 1.0) -> str:
+    """A number and its standard error, with the digits that two digits of the error leave.
+
+    A dash where the number is not known; two digits without an error where that is not known.
+    """
+    value, error = factor * value, factor * error
+    if not math.isfinite(value):
+        return '–'
+    if not math.isfinite(error) or error <= 0.0:
+        return number(value, 2)
+    decimals = max(0, 1 - math.floor(math.log10(error)))
+    return f'{value:.{decimals}f} ± {error:.{decimals}f}'

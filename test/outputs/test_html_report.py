@@ -15,6 +15,7 @@ from nanorocks_ros.outputs.html_report import (
     Section,
     Table,
     number,
+    with_error,
     write_report,
 )
 
@@ -82,3 +83,11 @@ def test_a_picture_that_is_missing_is_named(tmp_path):
 def test_numbers_that_are_not_known_are_dashes():
     assert number(None) == number(float('nan')) == '–'
     assert number(0.0012345, 3, 1e3) == '1.23'
+    assert number(1254.0) == '1250'
+
+
+def test_a_number_has_the_digits_that_its_error_leaves():
+    assert with_error(0.0123456, 0.000231, 1e3) == '12.35 ± 0.23'
+    assert with_error(1234.5, 99.7) == '1234 ± 100'
+    assert with_error(0.5, float('nan')) == with_error(0.5, 0.0) == '0.5'
+    assert with_error(float('nan'), 1.0) == '–'
