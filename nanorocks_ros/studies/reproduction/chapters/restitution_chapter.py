@@ -219,11 +219,11 @@ def _errata() -> list[Erratum]:
             text='Its closed form loses a factor of 2 between the loss of energy and the decay '
             'time, assumes a dilute gas in a large box, and in its first form neglects the walls, '
             'which take more energy than the beads in tray 1. Applied to the decay of the kinetic '
-            f'theory between walls for a restitution of {_EXAMPLE:g}, it gives {by_closed_form:.2f}. '
-            f'Its worked example gives {paper_restitution(*decay):.3f} as printed, from a decay rate of '
-            f'{rate:.0f} /m, {rate / expected:.1f} times that of a gas with such beads and '
-            'walls. Beads that stick cool as fast, and so do beads that rub on floor and lid '
-            '(docs/method/rotation.md).'
+            f'theory between walls for a restitution of {_EXAMPLE:g}, it gives '
+            f'{by_closed_form:.2f}. Its worked example gives {paper_restitution(*decay):.3f} as '
+            f'printed, from a decay rate of {rate:.0f} /m, {rate / expected:.1f} times that of a '
+            'gas with such beads and walls. Beads that stick cool as fast, and so do beads that '
+            'rub on floor and lid (docs/method/rotation.md).'
         ),
         Erratum(
             text=f'The axes of its wall ellipse are printed as a = {printed[0]:g}, b = '
