@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 # Length of a window of the area: ten averaged frames and the ten before, [s].
 _WINDOW = 20.0 / 30.0
+# Time after the shaking event in which the speeds fall ([B19] section 3.1.1), [s].
+_DAMPED = 20.0
 
 
 class AreaSeries(NamedTuple):
@@ -91,23 +93,42 @@ def calibrated(series: AreaSeries, fit: AreaFit) -> AreaSeries:
     )
 
 
-def calibrated_restitution(cycle: CycleFiles, tray: Tray, fit: AreaFit) -> float:
-    """Restitution by the closed form of the paper from calibrated speeds; NaN where it has none.
+class CalibratedDecay(NamedTuple):
+    """Haff's law fitted to calibrated speeds.
 
-    In the time that the analysis by the recipe of the paper used.
+    `start`: of its time, since the shaking event, [s]; `initial_speed`: [m/s]; `haff_time`: [s];
+    `decay_rate`: 1 / (v0 tau), [1/m].
+    """
+
+    start: float
+    initial_speed: float
+    haff_time: float
+    decay_rate: float
+
+
+def calibrated_decay(cycle: CycleFiles, tray: Tray, fit: AreaFit) -> CalibratedDecay:
+    """Haff's law from the first speed on, for the 20 s in which the speeds fall in the paper.
+
+    Raises
+    ------
+    FitError
+        When the calibrated speeds are no decay.
     """
     series = calibrated(area_series(cycle, tray.number), fit)
-    results = cycle.first_cycle(tray.number, 'paper')
-    first, last = results.get('window_start'), results.get('window_end')
-    if first is None or last is None:
-        return math.nan
-    used = (series.times >= first) & (series.times <= last)
-    used &= (series.speed > 0.0) & (series.error > 0.0)
+    used = (series.times <= _DAMPED) & (series.speed > 0.0) & (series.error > 0.0)
     times, speed, error = (values[used] for values in series)
+    if not times.size:
+        raise FitError(f'tray {tray.number}', 'no calibrated speed is above 0', 'mark more beads')
+    first = float(times[0])
+    fitted = fit_haff(times - first, speed, error, tray.count)
+    return CalibratedDecay(first, fitted.initial_speed, fitted.haff_time, fitted.decay_rate)
+
+
+def calibrated_restitution(cycle: CycleFiles, tray: Tray, fit: AreaFit) -> float:
+    """Restitution by the closed form of the paper from calibrated speeds; NaN without one."""
     try:
-        fitted = fit_haff(times - first, speed, error, tray.count)
+        rate = calibrated_decay(cycle, tray, fit).decay_rate
     except FitError:
         return math.nan
-    restitution = paper_restitution_of_decay(fitted.decay_rate, tray.diameter, tray.number_density)
     # 0: the decay is faster than the form allows.
-    return restitution or math.nan
+    return paper_restitution_of_decay(rate, tray.diameter, tray.number_density) or math.nan

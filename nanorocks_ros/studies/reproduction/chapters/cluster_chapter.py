@@ -116,8 +116,9 @@ def cluster_chapter(context: Context) -> Chapter:
             caption='Table 3: at the end of cycles in which beads stick below '
             f'{_MM * context.plan.sticking_speed:g} mm/s, counted as in the paper: two or more '
             'beads that stick are a cluster, single beads are none. Mean over the cycles; '
-            'clusters and shares ± standard error, beads in each ± mean absolute deviation of '
-            'the cycles as in the paper; from a single cycle, ± the error of our count alone. '
+            'clusters and shares ± standard error, by the scatter of the cycles or the errors of '
+            'our counts, whichever is larger; beads in each ± mean absolute deviation of the '
+            'cycles as in the paper. '
             'A dash: not counted, since chalk hides beads or grains are too many. The counts of '
             'the flight need not agree with these: its sticking speed is unknown, and simulated '
             'clusters do not break, so that nearly all beads end in one cluster, where the paper '
@@ -189,10 +190,11 @@ def _table_3_cells(ends: Sequence[_End]) -> tuple[str, str, str]:
 def _with_own_error(
     values: Sequence[float | None], errors: Sequence[float | None], factor: float = 1.0
 ) -> str:
-    """Mean and standard error over the cycles; the error of the measurement for a single one."""
-    if mean_of(values)[2] == 1:
-        return with_error(mean_of(values)[0], mean_of(errors)[0], factor)
-    return mean_text(values, factor)
+    """Mean over the cycles, and its error by their scatter or by those of the measurements."""
+    mean, scatter, count = mean_of(values)
+    return with_error(
+        mean, float(np.fmax(scatter, mean_of(errors)[0])) / math.sqrt(max(count, 1)), factor
+    )
 
 
 def packing_chapter(context: Context) -> Chapter:

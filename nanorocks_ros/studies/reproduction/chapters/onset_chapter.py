@@ -12,7 +12,13 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, number
+from nanorocks_ros.outputs.html_report import (
+    Erratum,
+    Picture,
+    Section,
+    Table,
+    with_interval,
+)
 from nanorocks_ros.physics.dust_models import PAPER_STICKING_SPEEDS, collapse_time_factor
 from nanorocks_ros.physics.paper_clusters import paper_onset
 from nanorocks_ros.studies.analysis.result_tables import read_columns
@@ -53,14 +59,13 @@ def onset_chapter(context: Context) -> Chapter:
         false_onsets = [cycle.first_cycle(tray).get('onset') for cycle in context.bouncing]
         alarms = sum(onset is not None for onset in false_onsets)
         speed, lower, upper = _sticking_speed(context, tray)
-        speed_text = '–' if math.isnan(speed) else number(speed, 3, _MM)
+        ours = with_interval(speed, (lower, upper), _MM)
         rows.append(
             (
                 str(tray), mean_text(paper), mean_text(control), onset,
                 f'{alarms} of {len(false_onsets)}', true_onset,
                 f'{_MM * PAPER_STICKING_SPEEDS[tray]:g}', threshold,
-                mean_text(control_thresholds, _MM),
-                f'{speed_text} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
+                mean_text(control_thresholds, _MM), ours,
             )
         )  # fmt: skip
         differences.append(
@@ -68,7 +73,7 @@ def onset_chapter(context: Context) -> Chapter:
                 f'sticking speed, tray {tray} [mm/s]',
                 f'{_MM * PAPER_STICKING_SPEEDS[tray]:g}',
                 threshold,
-                f'{speed_text} [{number(lower, 3, _MM)}, {number(upper, 3, _MM)}]',
+                ours,
                 f'{_MM * context.plan.sticking_speed:g}',
             )
         )

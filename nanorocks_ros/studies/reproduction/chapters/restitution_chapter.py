@@ -13,7 +13,7 @@ from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.instantaneous_restitution import InstantaneousCor
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table
+from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, with_interval
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import (
     paper_restitution,
@@ -38,6 +38,7 @@ from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
     Difference,
     mean_text,
 )
+from nanorocks_ros.studies.reproduction.chapters.energy_figure import energy_figure
 from nanorocks_ros.studies.reproduction.marked_calibration import (
     calibrated_restitution,
     marked_fit,
@@ -80,11 +81,11 @@ def restitution_chapter(context: Context) -> Chapter:
         f'{first.its_method} in tray 1, our estimate is {first.ours}.'
     )
     section.parts += [
+        _energy_part(context),
         Picture(
             path=folder / DECAY,
-            caption='Figure 7: energy of the beads of tray 1 as they cool, after the tray has '
-            'come to rest. The paper draws the energy at twice the mean speed, its estimate of '
-            'the relative speed.',
+            caption='The same by our speeds, in the time that we use: after the tray has come to '
+            'rest, whose walls drive the beads until then.',
         ),
         Table(
             head=('tray', 'its closed form, calibrated area', 'its closed form, our speeds',
@@ -122,6 +123,22 @@ def restitution_chapter(context: Context) -> Chapter:
             'Figure 13 needs more speeds above their noise than these cycles have.'
         )
     return Chapter(section=section, differences=differences, findings=[finding])
+
+
+def _energy_part(context: Context) -> Picture | str:
+    """Figure 7 by the recipe of the paper, or why it cannot be drawn."""
+    path = context.picture('energy.png')
+    try:
+        energy_figure(path, context.bouncing[0], load_trays()[_TRAY])
+    except FitError as error:
+        return f'Figure 7 by the recipe of the paper could not be drawn: {error}.'
+    return Picture(
+        path=path,
+        caption='Figure 7: energy of the beads of tray 1 by the calibrated area from the shaking '
+        'event on, and the fit of the paper. As in the paper it is taken at twice the mean speed, '
+        'its estimate of the relative speed. What it fitted in flight decays faster than beads '
+        'of its restitution do.',
+    )
 
 
 def _data(context: Context) -> CorData:
@@ -186,9 +203,7 @@ def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
         mean_of([cycle.get(name + suffix) for cycle in cycles])[0]
         for suffix in ('', '_lower', '_upper')
     )
-    if math.isnan(value):
-        return '–'
-    return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
+    return with_interval(value, (lower, upper))
 
 
 def _rate() -> float:

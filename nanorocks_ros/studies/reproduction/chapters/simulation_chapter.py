@@ -90,9 +90,10 @@ def simulation_chapter(context: Context) -> Chapter:
                 rows=rows,
                 caption='Deviation of the simulated from the measured mean decay, mean over its '
                 'times. Chi square in units of the squared errors of both, with the scatter of '
-                'the gas from run to run: about 1 for agreement. The paper prints '
-                f'{reported.PAPER_CHI_SQUARE:g} for its best match and defines no units, so the '
-                'two cannot be compared.',
+                'the gas from run to run: about 1 for agreement, but a gas that is slow by '
+                'chance stays slow, so that a mean of few cycles is often far from 1. The '
+                f'paper prints {reported.PAPER_CHI_SQUARE:g} for its best match and '
+                'defines no units, so the two cannot be compared.',
             ),
         ],
     )
