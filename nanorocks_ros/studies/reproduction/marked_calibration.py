@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.inference.decay.haff_fit import HaffFit
     from nanorocks_ros.studies.calibration.area_fit import AreaFit
     from nanorocks_ros.studies.reproduction.campaign_cycle import CycleFiles
 
@@ -96,14 +97,11 @@ def calibrated(series: AreaSeries, fit: AreaFit) -> AreaSeries:
 class CalibratedDecay(NamedTuple):
     """Haff's law fitted to calibrated speeds.
 
-    `start`: of its time, since the shaking event, [s]; `initial_speed`: [m/s]; `haff_time`: [s];
-    `decay_rate`: 1 / (v0 tau), [1/m].
+    `start`: of its time, since the shaking event, [s]; `haff`: the fit.
     """
 
     start: float
-    initial_speed: float
-    haff_time: float
-    decay_rate: float
+    haff: HaffFit
 
 
 def calibrated_decay(cycle: CycleFiles, tray: Tray, fit: AreaFit) -> CalibratedDecay:
@@ -120,14 +118,13 @@ def calibrated_decay(cycle: CycleFiles, tray: Tray, fit: AreaFit) -> CalibratedD
     if not times.size:
         raise FitError(f'tray {tray.number}', 'no calibrated speed is above 0', 'mark more beads')
     first = float(times[0])
-    fitted = fit_haff(times - first, speed, error, tray.count)
-    return CalibratedDecay(first, fitted.initial_speed, fitted.haff_time, fitted.decay_rate)
+    return CalibratedDecay(first, fit_haff(times - first, speed, error, tray.count))
 
 
 def calibrated_restitution(cycle: CycleFiles, tray: Tray, fit: AreaFit) -> float:
     """Restitution by the closed form of the paper from calibrated speeds; NaN without one."""
     try:
-        rate = calibrated_decay(cycle, tray, fit).decay_rate
+        rate = calibrated_decay(cycle, tray, fit).haff.decay_rate
     except FitError:
         return math.nan
     # 0: the decay is faster than the form allows.

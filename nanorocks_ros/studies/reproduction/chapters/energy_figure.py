@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.html_report import with_error
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.studies.reproduction.campaign_plan import FIRST_SHAKE
@@ -44,7 +45,7 @@ def energy_figure(path: Path, cycle: CycleFiles, tray: Tray) -> None:
     """
     fit = marked_fit(cycle, tray)
     series = calibrated(area_series(cycle, tray.number), fit)
-    decay = calibrated_decay(cycle, tray, fit)
+    first, haff = calibrated_decay(cycle, tray, fit)
     figure = Figure(figsize=(8.0, 4.2), layout='constrained')
     axes: Any = figure.subplots()
     truth = cycle.tray(tray.number)['truth']
@@ -56,14 +57,15 @@ def energy_figure(path: Path, cycle: CycleFiles, tray: Tray) -> None:
     axes.plot(series.times, _energy(series.speed, tray), '.', ms=3, color=_AREA,
               label='calibrated area')  # fmt: skip
     start = np.linspace(0.0, float(series.times[-1]), 300)
-    fitted = haff_speed(start, decay.initial_speed, decay.haff_time)
-    initial = _energy(np.array([decay.initial_speed]), tray)[0]
+    initial = float(_energy(np.array([haff.initial_speed]), tray)[0])
+    initial_error = 2.0 * initial * haff.initial_speed_error / haff.initial_speed
     axes.plot(
-        start + decay.start,
-        _energy(fitted, tray),
+        start + first,
+        _energy(haff_speed(start, haff.initial_speed, haff.haff_time), tray),
         color=_FIT,
         lw=1.5,
-        label=f'fit: T0 = {initial:.2g} nJ, τ = {decay.haff_time:.2g} s',
+        label=f'fit: T0 = {with_error(initial, initial_error)} nJ, '
+        f'τ = {with_error(haff.haff_time, haff.haff_time_error)} s',
     )
     energy, time = _NANO * reported.PAPER_ENERGY, reported.PAPER_HAFF_TIME
     axes.plot(start, energy / (1.0 + start / time) ** 2, '--', color='k', lw=1,
