@@ -36,7 +36,7 @@ from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
     Difference,
     mean_text,
 )
-from nanorocks_ros.studies.reproduction.chapters.growth_figure import growth_figure
+from nanorocks_ros.studies.reproduction.figures.growth_figure import growth_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -38,7 +38,7 @@ from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
     Difference,
     mean_text,
 )
-from nanorocks_ros.studies.reproduction.chapters.energy_figure import energy_figure
+from nanorocks_ros.studies.reproduction.figures.energy_figure import energy_figure
 from nanorocks_ros.studies.reproduction.marked_calibration import (
     calibrated_restitution,
     marked_fit,

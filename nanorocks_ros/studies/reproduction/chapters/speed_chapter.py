@@ -21,12 +21,12 @@ from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table
 from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 from nanorocks_ros.studies.inspection.speeds_figure import speeds_figure
 from nanorocks_ros.studies.reproduction.campaign_plan import plate_settings
-from nanorocks_ros.studies.reproduction.chapters.area_figure import area_figure
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
     Chapter,
     Difference,
     mean_text,
 )
+from nanorocks_ros.studies.reproduction.figures.area_figure import area_figure
 from nanorocks_ros.studies.reproduction.marked_calibration import (
     area_series,
     calibrated,
