@@ -27,6 +27,12 @@ PAPER_TRACKED = {
 PAPER_PEAK_SPEED = 0.007
 """Of tray 1 after shaking, [m/s] (section 3.1.1)."""
 
+PAPER_CHI_SQUARE = 7e-3
+"""Mean deviation of the simulated from the measured decay (figure 11); not defined there."""
+
+PAPER_CLUSTER_PEAK = 16.5
+"""Largest cluster size of its cycle of tray 3, [beads] (figure 8e)."""
+
 PAPER_RESTITUTION = 0.89
 """Of tray 1 (section 3.1.2, figure 7)."""
 
@@ -35,6 +41,9 @@ PAPER_RESTITUTION_RANGE = (0.55, 0.94)
 
 PAPER_WALL_RESTITUTION = 0.99
 """Of its search (section 4.1)."""
+
+PAPER_MASS = 4.9e-6
+"""Of a bead of tray 1, as printed, [kg] (section 3.1.2)."""
 
 PAPER_ENERGY = 2.70e-10
 """T0 of figure 7, [J]."""

@@ -165,4 +165,38 @@ def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
     """A number for a cell of a table; a dash where it is not known."""
     if value is None or not math.isfinite(value):
         return '–'
-    return f'{factor * value:.{digits}g}'
+    text = f'{factor * value:.{digits}g}'
+    return f'{float(text):.0f}' if 'e+' in text else text
+
+
+def with_interval(value: float, interval: tuple[float, float], factor: float = 1.0) -> str:
+    """A number and its interval of 95 %, with the digits that a quarter of its length leaves.
+
+    A dash where the number is not known.
+    """
+    if not math.isfinite(value):
+        return '–'
+    lower, upper = (factor * end for end in interval)
+    decimals = _decimals(0.25 * (upper - lower)) if upper > lower else 3
+    return f'{factor * value:.{decimals}f} [{lower:.{decimals}f}, {upper:.{decimals}f}]'
+
+
+def _decimals(error: float) -> int:
+    """Decimals that two digits of an error leave."""
+    return max(0, 1 - math.floor(math.log10(error)))
+
+
+def with_error(value: float, error: float, factor: float = 1.0) -> str:
+    """A number and its standard error, with the digits that two digits of the error leave.
+
+    At most four digits, with smaller errors rounded up to the last. A dash where the number is
+    not known; two digits without an error where that is not known; the number alone where the
+    error is 0.
+    """
+    value, error = factor * value, factor * error
+    if not math.isfinite(value):
+        return '–'
+    if not error > 0.0 or math.isinf(error):
+        return number(value, 3 if error == 0.0 else 2)
+    decimals = _decimals(max(error, 0.01 * abs(value)))
+    return f'{value:.{decimals}f} ± {max(error, 10.0**-decimals):.{decimals}f}'

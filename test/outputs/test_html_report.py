@@ -15,6 +15,8 @@ from nanorocks_ros.outputs.html_report import (
     Section,
     Table,
     number,
+    with_error,
+    with_interval,
     write_report,
 )
 
@@ -82,3 +84,21 @@ def test_a_picture_that_is_missing_is_named(tmp_path):
 def test_numbers_that_are_not_known_are_dashes():
     assert number(None) == number(float('nan')) == '–'
     assert number(0.0012345, 3, 1e3) == '1.23'
+    assert number(1254.0) == '1250'
+
+
+def test_a_number_has_the_digits_that_its_error_leaves():
+    assert with_error(0.0123456, 0.000231, 1e3) == '12.35 ± 0.23'
+    assert with_error(1234.5, 99.7) == '1234 ± 100'
+    # The scatter of two cycles may be small by chance.
+    assert with_error(0.962575, 0.000011) == '0.9626 ± 0.0001'
+    assert with_error(799.4, float('nan')) == '800'
+    assert with_error(799.0, 0.0) == '799'
+    assert with_error(float('nan'), 1.0) == '–'
+
+
+def test_an_interval_has_the_digits_that_its_length_leaves():
+    assert with_interval(0.8931, (0.8652, 0.9191)) == '0.893 [0.865, 0.919]'
+    assert with_interval(2.981e-3, (2.39e-3, 3.701e-3), 1e3) == '2.98 [2.39, 3.70]'
+    assert with_interval(0.797, (0.2, 0.992)) == '0.80 [0.20, 0.99]'
+    assert with_interval(float('nan'), (0.0, 1.0)) == '–'

@@ -137,14 +137,16 @@ def size_statistics(
     if counted == 0:
         return SizeStatistics(counts=np.full(5, math.nan))
     scale = beads / counted
+    clusters = int(np.count_nonzero(sizes > 1))
     share_single = np.count_nonzero(sizes == 1) / counted
     values = {
-        'bodies': scale * sizes.size,
+        # Beads detected twice lower the scale, but not below the body that was seen.
+        'bodies': max(scale * sizes.size, 1.0),
         'mean_size': counted / sizes.size,
         # Beads detected twice make bodies too large; missing beads are taken for single ones.
         'weighted_size': float(np.sum(sizes**2)) / counted * min(scale, 1.0),
         'clustered_share': 1.0 - share_single,
-        'clusters': scale * np.count_nonzero(sizes > 1),
+        'clusters': max(scale * clusters, min(clusters, 1)),
     }
     edges = (*(0, *_SIZE_CLASSES), np.inf)
     counts = [np.count_nonzero((sizes > low) & (sizes <= high)) for low, high in pairwise(edges)]

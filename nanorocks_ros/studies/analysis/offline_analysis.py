@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.outputs.disk_list import Spool, SpoolFile
-from nanorocks_ros.pipeline.composition import Pipeline
+from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.records import (
     NS,
     BodyEstimate,
@@ -27,7 +27,7 @@ from nanorocks_ros.studies.analysis.bag_images import PreprocessedFrames, open_c
 from nanorocks_ros.wire.products import MEASURED, is_measured
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from nanorocks_ros.errors import FrameError
@@ -193,6 +193,7 @@ def analyse(
     image_topic: str = '',
     progress: Progress | None = None,
     scratch: Path | None = None,
+    observer: Callable[[Result], None] | None = None,
 ) -> Analysis:
     """Push every frame of a bag through the pipeline.
 
@@ -206,6 +207,8 @@ def analyse(
         Called with the frames done and the frames there are.
     scratch : Path, optional
         Folder on a disk with room for the records, which are kept in memory otherwise.
+    observer : callable, optional
+        Called with every result of the frames, tracks included, most of which are not kept.
 
     Returns
     -------
@@ -233,10 +236,15 @@ def analyse(
         prior=settings.prior,
     )
     frames = PreprocessedFrames(bag, pipeline.preprocessor)
+    wanted = dict.fromkeys(settings.trays, Wanted(tracks=observer is not None))
     for shot in frames.shots(progress):
         if shot.images:
             result.stamps_ns.append(shot.frame.stamp_ns)
-        _keep(result, pipeline.follow(shot.records))
+        records = pipeline.follow(shot.records, wanted)
+        _keep(result, records)
+        if observer is not None:
+            for record in records:
+                observer(record)
     result.error, result.refused = frames.error, frames.refused
     result.notices += frames.lens_notices
     duplicates = pipeline.preprocessor.duplicates

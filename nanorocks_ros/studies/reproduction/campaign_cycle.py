@@ -15,25 +15,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.settings import CompressionSettings, SceneSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results_folder import write_results
 from nanorocks_ros.studies.analysis.results_json import as_json
 from nanorocks_ros.studies.reproduction.campaign_plan import paper_settings, plate_settings
-from nanorocks_ros.studies.synthetic.film_bag import START_NS
+from nanorocks_ros.studies.reproduction.campaign_truth import TrackSampler, film_truth
 from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
-from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.bead_truth import beads_from_array
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
     from nanorocks_ros.studies.reproduction.campaign_plan import CycleTask
 
 FILM, RESULTS, PAPER, SUMMARY = 'film', 'results', 'paper', 'summary.json'
@@ -41,8 +33,6 @@ _PROGRESS = 'done'
 _QUALITY = 85
 # Shares of the work on a cycle: film, analysis, analysis by the paper's recipe.
 _SHARES = (0.35, 0.45, 0.2)
-# Interval between two rows of the true clusters, [s].
-_TRUTH_STEP = 0.2
 _PROGRESS_STEP_FRAMES = 30
 
 
@@ -57,8 +47,7 @@ class CycleFiles:
         `BOUNCING` or `STICKING`.
     summary : dict
         ``default`` and ``paper``: the analyses, as `nanorocks analyse --json` prints them;
-        ``followed``: by tray, the mean share of its beads in tracks; ``clusters``: by tray, the
-        true bodies over time.
+        ``truth`` and ``tracked``: see `campaign_truth.FilmTruth`.
     """
 
     folder: Path
@@ -96,17 +85,25 @@ def film_and_analyse(task: CycleTask) -> str:
     recorder = SceneRecorder(task.simulation, scene, task.plan.seconds)
     recorder.into_bag(film, CompressionSettings(), _QUALITY, partial(_write_progress, part, 0))
     settings = plate_settings()
-    analysis = analyse(film, settings, progress=partial(_write_progress, part, 1), scratch=part)
+    sampler = TrackSampler()
+    analysis = analyse(
+        film,
+        settings,
+        progress=partial(_write_progress, part, 1),
+        scratch=part,
+        observer=sampler,
+    )
     write_results(analysis, part / RESULTS, film, settings)
     by_paper = analyse(
         film, paper_settings(), progress=partial(_write_progress, part, 2), scratch=part
     )
     write_results(by_paper, part / PAPER, film, paper_settings())
+    truth = film_truth(film, sampler.tracks)
     summary = {
         'default': as_json(analysis),
         'paper': as_json(by_paper),
-        'followed': _tracked_shares(analysis),
-        'clusters': _true_clusters(film),
+        'truth': truth.series,
+        'tracked': truth.tracked,
     }
     (part / SUMMARY).write_text(json.dumps(summary), 'utf-8')
     if task.number > 1:
@@ -158,42 +155,3 @@ def read_cycle(task: CycleTask) -> CycleFiles:
             str(path), 'is damaged', f'delete {task.folder} and run the command again'
         ) from error
     return CycleFiles(folder=task.folder, kind=task.kind, summary=summary)
-
-
-def _tracked_shares(analysis: Analysis) -> dict[str, float | None]:
-    """By tray, the mean share of its beads in tracks after the shaking event."""
-    shares: dict[str, float | None] = {}
-    for number, results in analysis.trays.items():
-        after = [body.followed / body.beads for body in results.bodies if body.cycle > 0]
-        shares[str(number)] = float(np.mean(after)) if after else None
-    return shares
-
-
-def _true_clusters(film: Path) -> dict[str, dict[str, list[float]]]:
-    """True bodies by tray over time: number, weighted size, clusters, beads in clusters."""
-    names = [topics.BEADS.absolute(number) for number in load_trays()]
-    rows: dict[str, list[Sequence[float]]] = {}
-    next_ns: dict[int, int] = {}
-    bag = open_bag(film)
-    for message in bag.messages(names):
-        tray = topics.tray_of(message.topic) or 0
-        if message.log_time_ns < next_ns.get(tray, 0):
-            continue
-        next_ns[tray] = message.log_time_ns + round(_TRUTH_STEP * 1e9)
-        values = bag.deserialize(message).data
-        beads = beads_from_array(values, tray=tray, epoch_ns=START_NS, where=message.topic)
-        sizes = np.unique(beads.bodies, return_counts=True)[1].astype(float)
-        clusters = sizes[sizes > 1.0]
-        time = (beads.stamp_ns - START_NS) / 1e9
-        weighted = float(np.sum(sizes**2) / sizes.sum())
-        rows.setdefault(str(tray), []).append(
-            (time, float(sizes.size), weighted, float(clusters.size), float(clusters.sum()))
-        )
-    columns = ('time', 'bodies', 'weighted_size', 'clusters', 'beads_in_clusters')
-    return {
-        tray: {
-            name: list(values)
-            for name, values in zip(columns, zip(*tray_rows, strict=True), strict=True)
-        }
-        for tray, tray_rows in rows.items()
-    }

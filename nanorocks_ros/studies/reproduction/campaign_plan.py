@@ -5,9 +5,11 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.experiment.paper_values import PAPER_PEAK_SPEED
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
 
 SCALE = 12500.0
 """Scale of the image of the plate at a width of 1920 pixels, [px/m]."""
+
+PROJECTED = 0.25 * math.pi
+"""Mean projected speed over mean speed of beads that fly in all directions alike."""
 
 BOUNCING, STICKING = 'bouncing', 'sticking'
 FIRST_SHAKE = 1.0
@@ -33,6 +38,8 @@ class CampaignPlan:
     seconds : float, [s]
         Length of the film of a cycle.
     seed : int
+    mean_speed : float, [m/s]
+        Mean three-dimensional speed of the beads after a shaking event.
     restitution, wall_restitution : float, 0 to 1
     sticking_speed : float, [m/s]
         Speed below which beads stick, in the cycles with sticking.
@@ -41,6 +48,7 @@ class CampaignPlan:
     cycles: int = 1
     seconds: float = 34.0
     seed: int = 1
+    mean_speed: float = round(PAPER_PEAK_SPEED / PROJECTED, 5)
     restitution: float = 0.89
     wall_restitution: float = 0.97
     sticking_speed: float = 3e-3
@@ -71,6 +79,7 @@ class CycleTask:
         plan = self.plan
         return SimulationSettings(
             seed=10_000 * plan.seed + 2 * self.number + int(self.kind == STICKING),
+            mean_speed=plan.mean_speed,
             restitution=plan.restitution,
             wall_restitution=plan.wall_restitution,
             sticking_speed=plan.sticking_speed if self.kind == STICKING else 0.0,
@@ -90,7 +99,16 @@ def plate_settings(**values: object) -> PipelineSettings:
 
 
 def paper_settings() -> PipelineSettings:
-    """`plate_settings` with the methods of the paper: binarised area, its closed form."""
+    """`plate_settings` with the methods of the paper: binarised area, its closed form.
+
+    The area by its Taylor expansion ([B19] eq. 2); the time step is that of the averages that are
+    compared, ten frames, where the paper writes one frame. A calibration takes either up.
+    """
     return plate_settings(
-        **{'speed.method': 'binarised_area', 'cooling.relation': 'paper', 'cooling.delay': 0.0}
+        **{
+            'speed.method': 'binarised_area',
+            'speed.geometry': 'taylor',
+            'cooling.relation': 'paper',
+            'cooling.delay': 0.0,
+        }
     )

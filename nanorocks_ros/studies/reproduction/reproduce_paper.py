@@ -6,9 +6,8 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
-from nanorocks_ros import __version__
 from nanorocks_ros.errors import FitError, RecordingError
-from nanorocks_ros.outputs.html_report import Section, Table, write_report
+from nanorocks_ros.outputs.html_report import Section, write_report
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Context
 from nanorocks_ros.studies.reproduction.chapters.cluster_chapter import (
     cluster_chapter,
@@ -21,14 +20,15 @@ from nanorocks_ros.studies.reproduction.chapters.experiment_chapter import (
 from nanorocks_ros.studies.reproduction.chapters.onset_chapter import onset_chapter
 from nanorocks_ros.studies.reproduction.chapters.restitution_chapter import (
     restitution_chapter,
-    simulation_chapter,
 )
 from nanorocks_ros.studies.reproduction.chapters.rotation_chapter import rotation_chapter
+from nanorocks_ros.studies.reproduction.chapters.simulation_chapter import simulation_chapter
 from nanorocks_ros.studies.reproduction.chapters.speed_chapter import speed_chapter
+from nanorocks_ros.studies.reproduction.report_head import conclusion, limits, summary
 from nanorocks_ros.studies.reproduction.simulated_campaign import prepare_campaign, run_campaign
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
     from nanorocks_ros.jobs.tasks import Workers
@@ -103,14 +103,11 @@ def reproduce(
         )
         chapters.append(_make_chapter(name, context))
     path = folder / REPORT
-    cycle = 'cycle' if plan.cycles == 1 else 'cycles'
     write_report(
         path,
         'NanoRocks, reproduced',
-        f'nanorocks_ros {__version__}: {plan.cycles} {cycle} without and {plan.cycles} with '
-        f'sticking, {plan.seconds:g} s of film each, seed {plan.seed}; {runs} runs at each '
-        'point of the searches.',
-        [_differences(chapters), *(chapter.section for chapter in chapters)],
+        summary(folder, plan, runs),
+        [conclusion(chapters), limits(), *(chapter.section for chapter in chapters)],
     )
     return path
 
@@ -127,21 +124,6 @@ def _make_chapter(name: str, context: Context) -> Chapter:
         chapter = Chapter(section=missing)
     context.progress(1.0)
     return chapter
-
-
-def _differences(chapters: Sequence[Chapter]) -> Section:
-    rows = [row for chapter in chapters for row in chapter.differences]
-    return Section(
-        title='Differences to the paper',
-        parts=[
-            Table(
-                head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
-                rows=rows,
-                caption='Values of the flight in the paper; the method of the paper on our films; '
-                'our default method on our films; values of the simulation.',
-            )
-        ],
-    )
 
 
 def minutes(plan: CampaignPlan, cores: int) -> int:

@@ -54,3 +54,5 @@ def test_double_detections_do_not_make_bodies_larger_than_the_tray_has_beads():
     statistics = size_statistics(np.array([12]), 10, [])
     assert statistics.weighted_size.value == pytest.approx(10.0)
     assert statistics.bodies.error > 0.0
+    # One body is seen; 10/12 of one is none.
+    assert statistics.bodies.value == statistics.clusters.value == 1.0

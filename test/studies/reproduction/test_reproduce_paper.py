@@ -6,8 +6,10 @@ import json
 
 import pytest
 
+from nanorocks_ros import __version__
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.experiment.paper_values import PAPER_PEAK_SPEED
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan, plate_settings
 from nanorocks_ros.studies.reproduction.reproduce_paper import reproduce
@@ -44,7 +46,12 @@ def test_each_cycle_has_a_film_two_analyses_and_the_truth(campaign):
         assert truth['restitution'] == pytest.approx(PLAN.restitution)
         assert (truth['sticking_speed'] > 0.0) == (kind == 'sticking')
         assert set(summary['paper']['trays']['1']['method']) == {'binarised_area'}
-        assert summary['clusters']['1']['bodies'][0] == 15
+        truth = summary['truth']['1']
+        assert truth['bodies'][0] == 15
+        assert max(truth['marked_speed']) == pytest.approx(PAPER_PEAK_SPEED, rel=0.4)
+        # Detected, found, and on no bead; grains alone are not tracked.
+        assert summary['tracked']['1'] == pytest.approx([1.0, 1.0, 0.0], abs=0.1)
+        assert set(summary['tracked']) <= {str(k) for k in range(1, 8)}
         assert (folder / 'film').exists()
     assert parts_done(campaign, PLAN) == 1.0
     assert not list(campaign.glob('.*.part'))
@@ -61,11 +68,25 @@ def test_the_report_has_all_chapters_even_with_short_films(campaign):
     notices = []
     path = reproduce(campaign, PLAN, ALONE, 2, lambda name, done: None, notices.append)
     text = path.read_text('utf-8')
-    assert text.count('<section') == 10
+    assert text.count('<section') == 11
+    # First what was run, and what cannot be had.
+    head = text[: text.index('The experiment (Table 1')]
+    assert __version__ in head
+    assert '`nanorocks reproduce --cycles 1 --runs 2 --seed 2' in head
+    assert text.index('What cannot be reproduced</h2>') < text.index('Table 1: the trays')
     # Three seconds of cooling are too short for a restitution.
     assert any(notice.startswith('restitution: ') for notice in notices)
     assert 'Could not be made' in text
-    for name in ('Table 1', 'Table 2', 'Figure 1b', 'Figure 2:', 'Figure 4', 'Figure 11'):
+    for name in (
+        'Table 1',
+        'Table 2',
+        'Figure 1b',
+        'Figure 2:',
+        'Figure 4',
+        'Figure 5: a)',
+        'Figure 8e',
+        'Figure 11',
+    ):
         assert name in text
 
 

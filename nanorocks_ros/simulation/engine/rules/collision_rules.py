@@ -126,7 +126,8 @@ class CollisionRules:
 
     References
     ----------
-    Luding, McNamara 1998, Granular Matter 1, 113 (contact duration); Jenkins, Richman 1985,
+    Luding, McNamara 1998, Granular Matter 1, 113 (contact duration; there for each particle,
+    here for each pair); Jenkins, Richman 1985,
     Phys. Fluids 28, 3485 (rough spheres).
     """
 

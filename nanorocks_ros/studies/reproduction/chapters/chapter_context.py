@@ -5,9 +5,12 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from nanorocks_ros.numerics.sample_mean import mean_of
+from nanorocks_ros.outputs.html_report import with_error
 from nanorocks_ros.studies.reproduction.campaign_plan import BOUNCING, STICKING
 
 if TYPE_CHECKING:
@@ -89,7 +92,17 @@ class Context:
 
 @dataclass(slots=True, kw_only=True)
 class Chapter:
-    """A section of the report, and its rows of the table of differences."""
+    """A section of the report, its rows of the table of differences, and what follows from it.
+
+    `findings` are sentences for the conclusion of the report.
+    """
 
     section: Section
     differences: list[Difference] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
+
+
+def mean_text(values: Sequence[float | None], factor: float = 1.0) -> str:
+    """Mean over the cycles and its standard error; without an error from a single cycle."""
+    mean, scatter, count = mean_of(values)
+    return with_error(mean, scatter / math.sqrt(max(count, 1)), factor)

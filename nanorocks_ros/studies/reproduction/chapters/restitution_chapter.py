@@ -1,4 +1,4 @@
-"""Chapters on the restitution and its simulation: Figures 7, 11, 12 and 13, closed forms.
+"""Chapter on the restitution: Figures 7, 12 and 13, closed forms.
 
 Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 """
@@ -8,18 +8,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.instantaneous_restitution import InstantaneousCor
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, number
+from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, with_interval
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import (
     paper_restitution,
     paper_restitution_of_decay,
     paper_wall_ellipse,
 )
-from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
 from nanorocks_ros.studies.decays.cooling_windows import cooling_window
 from nanorocks_ros.studies.figures.cor_figures import (
@@ -33,10 +33,16 @@ from nanorocks_ros.studies.figures.cor_figures import (
     cor_figures,
     prepare_folder,
 )
-from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
-from nanorocks_ros.studies.synthetic.simulated_figure import simulated_figure
-from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
-from nanorocks_ros.studies.synthetic.simulated_runs import simulate
+from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
+    Chapter,
+    Difference,
+    mean_text,
+)
+from nanorocks_ros.studies.reproduction.figures.energy_figure import energy_figure
+from nanorocks_ros.studies.reproduction.marked_calibration import (
+    calibrated_restitution,
+    marked_fit,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +52,6 @@ if TYPE_CHECKING:
 
 _TRAY = 1
 _SPAN = (1.75, 20.0)
-_DURATION, _SAMPLES = 30.0, 301
 _BEADS = tuple(0.5 + 0.02 * k for k in range(26))
 _WALLS = tuple(0.8 + 0.02 * k for k in range(11))
 # Restitution of the decay to which the closed form of the paper is applied in the errata.
@@ -70,29 +75,40 @@ def restitution_chapter(context: Context) -> Chapter:
     reports = Reports(progress=progress, notice=context.notice)
     values = cor_figures(folder, data, search, context.workers, reports)
     rows, differences = _by_tray(context)
+    first = differences[0]
+    finding = (
+        f'From films of beads of {first.truth} the closed form of the paper gives '
+        f'{first.its_method} in tray 1, our estimate is {first.ours}.'
+    )
     section.parts += [
+        _energy_part(context),
         Picture(
             path=folder / DECAY,
-            caption='Figure 7: energy of the beads of tray 1 as they cool, after the tray has '
-            'come to rest.',
+            caption='The same by our speeds, in the time that we use: after the tray has come to '
+            'rest, whose walls drive the beads until then.',
         ),
         Table(
-            head=('tray', 'its closed form, its speeds', 'its closed form, our speeds',
+            head=('tray', 'its closed form, calibrated area', 'its closed form, our speeds',
                   'ours, beads [95 %]', 'ours, walls [95 %]', 'cycles known'),
             rows=rows,
-            caption='Restitution by tray, mean over the cycles without sticking. Truth: beads '
+            caption='Restitution by tray, mean over the cycles without sticking; ± standard error '
+            'of that mean (none for a single cycle), and in brackets the mean ends of the '
+            'intervals of single cycles. Truth: beads '
             f'{context.plan.restitution:g}, walls {context.plan.wall_restitution:g}. The paper: '
             f'{reported.PAPER_RESTITUTION:g} for tray 1, {reported.PAPER_RESTITUTION_RANGE[0]:g} '
-            f'to {reported.PAPER_RESTITUTION_RANGE[1]:g} over all trays. A dash: no reliable '
-            'value, as for grains, which are not tracked.',
+            f'to {reported.PAPER_RESTITUTION_RANGE[1]:g} over all trays; the other values are in '
+            'the inset of its figure alone. A dash: no reliable '
+            'value, as for grains, which are not tracked, or an area that does not follow the '
+            'marked beads.',
         ),
         *_errata(),
         Picture(
             path=folder / WALLS,
-            caption='Figure 12: chi square of the decay over the restitutions of beads and walls. '
+            caption='Figure 12, right: chi square of the decay over the restitutions of beads and '
+            'walls, from simulated beads that start with uniform speeds and do not stick. '
             'Its minimum is a valley; rebounds and collisions in the tracks select a point in it.',
         ),
-        Picture(path=folder / WIDTH, caption='Figure 12: the same for a distribution of '
+        Picture(path=folder / WIDTH, caption='Figure 12, left: the same for a distribution of '
                 'restitutions and its width, which the decay does not determine.'),
     ]  # fmt: skip
     if isinstance(values['instantaneous'], InstantaneousCor):
@@ -106,38 +122,23 @@ def restitution_chapter(context: Context) -> Chapter:
         section.parts.append(
             'Figure 13 needs more speeds above their noise than these cycles have.'
         )
-    return Chapter(section=section, differences=differences)
+    return Chapter(section=section, differences=differences, findings=[finding])
 
 
-def simulation_chapter(context: Context) -> Chapter:
-    """Figure 11."""
-    settings = SimulationSettings(
-        tray=_TRAY,
-        restitution=reported.PAPER_RESTITUTION,
-        wall_restitution=reported.PAPER_WALL_RESTITUTION,
-        seed=context.plan.seed,
+def _energy_part(context: Context) -> Picture | str:
+    """Figure 7 by the recipe of the paper, or why it cannot be drawn."""
+    path = context.picture('energy.png')
+    try:
+        energy_figure(path, context.bouncing[0], load_trays()[_TRAY])
+    except FitError as error:
+        return f'Figure 7 by the recipe of the paper could not be drawn: {error}.'
+    return Picture(
+        path=path,
+        caption='Figure 7: energy of the beads of tray 1 by the calibrated area from the shaking '
+        'event on, and the fit of the paper. As in the paper it is taken at twice the mean speed, '
+        'its estimate of the relative speed. What it fitted in flight decays faster than beads '
+        'of its restitution do.',
     )
-    plan = SimulationPlan(
-        settings=settings,
-        tray=load_trays()[_TRAY],
-        duration=_DURATION,
-        samples=_SAMPLES,
-        runs=reported.PAPER_RUNS,
-        picture=True,
-    )
-    runs = simulate(plan, context.workers, context.progress)
-    path = context.picture('simulated.png')
-    simulated_figure(path, runs)
-    section = Section(
-        title='The simulation (Figure 11)',
-        parts=[
-            f'{reported.PAPER_RUNS} simulated runs of tray 1 with the restitutions of the paper, '
-            '0.89 and 0.99. The paper simulated with soft spheres; here collisions '
-            'are events, so energy is lost only at collisions.',
-            Picture(path=path, caption='Figure 11: runs, and their mean.'),
-        ],
-    )
-    return Chapter(section=section)
 
 
 def _data(context: Context) -> CorData:
@@ -161,11 +162,10 @@ def _data(context: Context) -> CorData:
 def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
     rows: list[Sequence[str]] = []
     differences = []
-    for tray in load_trays():
+    for tray, properties in load_trays().items():
         ours = [cycle.first_cycle(tray, 'default') for cycle in context.bouncing]
-        paper = [cycle.first_cycle(tray, 'paper') for cycle in context.bouncing]
-        paper_method = number(mean_of([cycle.get('restitution') for cycle in paper])[0])
-        paper_formula = number(mean_of([cycle.get('paper_restitution') for cycle in ours])[0])
+        paper_method = mean_text(_by_calibrated_area(context, properties))
+        paper_formula = mean_text([cycle.get('paper_restitution') for cycle in ours])
         known = [cycle for cycle in ours if cycle.get('restitution') is not None]
         beads = _with_interval(known, 'restitution')
         walls = _with_interval(known, 'wall_restitution')
@@ -186,6 +186,15 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
     return rows, differences
 
 
+def _by_calibrated_area(context: Context, tray: Tray) -> list[float]:
+    """Restitution of each cycle by the closed form; none where the area cannot be calibrated."""
+    try:
+        fit = marked_fit(context.bouncing[0], tray)
+    except FitError:
+        return []
+    return [calibrated_restitution(cycle, tray, fit) for cycle in context.bouncing]
+
+
 def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
     """Mean value and mean ends of the intervals, as text."""
     if not cycles:
@@ -194,14 +203,12 @@ def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
         mean_of([cycle.get(name + suffix) for cycle in cycles])[0]
         for suffix in ('', '_lower', '_upper')
     )
-    if math.isnan(value):
-        return '–'
-    return f'{value:.3f} [{lower:.3f}, {upper:.3f}]'
+    return with_interval(value, (lower, upper))
 
 
-def _rate(tray: Tray) -> float:
+def _rate() -> float:
     """Decay rate 1/(v0 tau) of the mean projected speed in figure 7, [1/m]."""
-    relative = math.sqrt(2.0 * reported.PAPER_ENERGY / tray.species[0].bead_mass)
+    relative = math.sqrt(2.0 * reported.PAPER_ENERGY / reported.PAPER_MASS)
     return 1.0 / (0.5 * relative * reported.PAPER_HAFF_TIME)
 
 
@@ -210,12 +217,12 @@ def _errata() -> list[Erratum]:
     decay = (
         reported.PAPER_ENERGY,
         reported.PAPER_HAFF_TIME,
-        tray.species[0].bead_mass,
+        reported.PAPER_MASS,
         tray.diameter,
         tray.number_density,
     )
     gas, walls = confined_gas(tray), reported.PAPER_WALL_RESTITUTION
-    rate = _rate(tray)
+    rate = _rate()
     expected = gas.decay_rate(reported.PAPER_RESTITUTION, walls)
     by_closed_form = paper_restitution_of_decay(
         gas.decay_rate(_EXAMPLE, walls), tray.diameter, tray.number_density
@@ -225,17 +232,18 @@ def _errata() -> list[Erratum]:
     return [
         Erratum(
             text='Its closed form loses a factor of 2 between the loss of energy and the decay '
-            'time, assumes a dilute gas in a large box, and neglects the walls, which take more '
-            'energy than the beads in tray 1. Applied to the decay of the kinetic theory between '
-            f'walls for a restitution of {_EXAMPLE:g}, it gives {by_closed_form:.2f}. Its worked '
-            f'example gives {paper_restitution(*decay):.3f} as printed, from a decay rate of '
-            f'{rate:.0f} /m, {rate / expected:.1f} times that of a gas with such beads and '
-            'walls. Beads that stick cool as fast, and so do beads that rub on floor and lid '
-            '(docs/method/rotation.md).'
+            'time, assumes a dilute gas in a large box, and in its first form neglects the walls, '
+            'which take more energy than the beads in tray 1. Applied to the decay of the kinetic '
+            f'theory between walls for a restitution of {_EXAMPLE:g}, it gives '
+            f'{by_closed_form:.2f}. Its worked example gives {paper_restitution(*decay):.3f} as '
+            f'printed, from a decay rate of {rate:.0f} /m, {rate / expected:.1f} times that of a '
+            'gas with such beads and walls. Beads that stick cool as fast, and so do beads that '
+            'rub on floor and lid (docs/method/rotation.md).'
         ),
         Erratum(
             text=f'The axes of its wall ellipse are printed as a = {printed[0]:g}, b = '
             f'{printed[1]:g}; its own formula gives a = {ellipse.wall_axis:.3f}, b = '
-            f'{ellipse.bead_axis:.3f}.'
+            f'{ellipse.bead_axis:.3f}. It takes the walls 15 mm apart, the sides of the cell, '
+            'where floor and lid leave the centres of the beads 1 mm.'
         ),
     ]

@@ -73,4 +73,8 @@ def rotation_chapter(context: Context) -> Chapter:
         number(spins[0]),
         '',
     )
-    return Chapter(section=section, differences=[row])
+    finding = (
+        f'Equipartition at 1 mm/s is a spin of {number(spins[0], 2)} degrees/s, not '
+        f'{PAPER_ROTATION:g}.'
+    )
+    return Chapter(section=section, differences=[row], findings=[finding])
