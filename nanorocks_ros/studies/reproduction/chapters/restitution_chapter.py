@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import FitError
+from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.instantaneous_restitution import InstantaneousCor
@@ -62,18 +62,6 @@ _WIDTHS = (0.0, 0.04, 0.08, 0.12, 0.16)
 def restitution_chapter(context: Context) -> Chapter:
     """Figures 7, 12 and 13, and the restitutions of each tray."""
     section = Section(title='The coefficient of restitution (Figures 7, 12 and 13)')
-    folder = context.folder / 'cor'
-    prepare_folder(folder)
-    data = _data(context)
-    search = Search(beads=_BEADS, walls=_WALLS, widths=_WIDTHS, runs=context.runs)
-    maps: dict[str, float] = {}
-
-    def progress(name: str, done: int, total: int) -> None:
-        maps[name] = done / total
-        context.progress(0.5 * sum(maps.values()))
-
-    reports = Reports(progress=progress, notice=context.notice)
-    values = cor_figures(folder, data, search, context.workers, reports)
     rows, differences = _by_tray(context)
     first = differences[0]
     finding = (
@@ -82,11 +70,6 @@ def restitution_chapter(context: Context) -> Chapter:
     )
     section.parts += [
         _energy_part(context),
-        Picture(
-            path=folder / DECAY,
-            caption='The same by our speeds, in the time that we use: after the tray has come to '
-            'rest, whose walls drive the beads until then.',
-        ),
         Table(
             head=('tray', 'its closed form, calibrated area', 'its closed form, our speeds',
                   'ours, beads [95 %]', 'ours, walls [95 %]', 'cycles known'),
@@ -102,27 +85,51 @@ def restitution_chapter(context: Context) -> Chapter:
             'marked beads.',
         ),
         *_errata(),
+        *_search_parts(context),
+    ]  # fmt: skip
+    return Chapter(section=section, differences=differences, findings=[finding])
+
+
+def _search_parts(context: Context) -> list[Picture | str]:
+    """Our decay, the search and the restitution against speed, or why they could not be made."""
+    folder = context.folder / 'cor'
+    prepare_folder(folder)
+    search = Search(beads=_BEADS, walls=_WALLS, widths=_WIDTHS, runs=context.runs)
+    maps: dict[str, float] = {}
+
+    def progress(name: str, done: int, total: int) -> None:
+        maps[name] = done / total
+        context.progress(0.5 * sum(maps.values()))
+
+    reports = Reports(progress=progress, notice=context.notice)
+    try:
+        values = cor_figures(folder, _data(context), search, context.workers, reports)
+    except (ConfigurationError, FitError, RecordingError) as error:
+        # A single cycle may be too far from all simulated decays.
+        context.notice(f'restitution: {error}')
+        return [f'Could not be made: Figures 12 and 13 and our decay: {error}.']
+    parts: list[Picture | str] = [
+        Picture(
+            path=folder / DECAY,
+            caption='Figure 7 by our speeds, in the time that we use: after the tray has come to '
+            'rest, whose walls drive the beads until then.',
+        ),
         Picture(
             path=folder / WALLS,
             caption='Figure 12, right: chi square of the decay over the restitutions of beads and '
             'walls, from simulated beads that start with uniform speeds and do not stick. '
             'Its minimum is a valley; rebounds and collisions in the tracks select a point in it.',
         ),
-        Picture(path=folder / WIDTH, caption='Figure 12, left: the same for a distribution of '
-                'restitutions and its width, which the decay does not determine.'),
-    ]  # fmt: skip
+        Picture(
+            path=folder / WIDTH,
+            caption='Figure 12, left: the same for a distribution of restitutions and its width, '
+            'which the decay does not determine.',
+        ),
+    ]
     if isinstance(values['instantaneous'], InstantaneousCor):
-        section.parts.append(
-            Picture(
-                path=folder / SPEED,
-                caption='Figure 13: restitution against speed, and the effect of noise alone.',
-            )
-        )
-    else:
-        section.parts.append(
-            'Figure 13 needs more speeds above their noise than these cycles have.'
-        )
-    return Chapter(section=section, differences=differences, findings=[finding])
+        caption = 'Figure 13: restitution against speed, and the effect of noise alone.'
+        return [*parts, Picture(path=folder / SPEED, caption=caption)]
+    return [*parts, 'Figure 13 needs more speeds above their noise than these cycles have.']
 
 
 def _energy_part(context: Context) -> Picture | str:
