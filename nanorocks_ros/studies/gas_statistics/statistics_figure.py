@@ -6,9 +6,11 @@ Tested by ``test/studies/gas_statistics/test_tray_statistics.py``.
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
+import matplotlib.ticker
 import numpy as np
 
 from nanorocks_ros.outputs.atomic_files import atomic_file
@@ -27,9 +29,11 @@ if TYPE_CHECKING:
 
 _MM, _NANOJOULE = 1e3, 1e9
 _SIZE, _DPI = (13.0, 8.0), 110
-_COLOURS = ('#2166ac', '#c23b22', '#1b7837')
+_COLOURS = ('#2166ac', '#c23b22', '#1b7837', '#762a83', '#b8860b', '#008080')
 _REFERENCE = '#8a8a8a'
-_LEAST_DENSITY = 1e-3
+_LEAST_DENSITY, _HIGHEST_DENSITY = 1e-3, 10.0
+# Largest cumulant at which the first Sonine polynomial alone is drawn: beyond, it goes negative.
+_MOST_SONINE = 0.5
 # Limit of the axis of pair correlations: clusters have far higher first peaks.
 _HIGHEST_PAIRS = 4.0
 
@@ -60,8 +64,9 @@ def statistics_figure(path: Path, statistics: TrayStatistics) -> None:
         draw(axes, statistics)
         axes.grid(alpha=0.25)
         if axes.get_yscale() == 'log' and draw is not _velocities:
+            # Labels between powers of ten only where few of them are shown.
+            axes.yaxis.set_minor_formatter(mpl.ticker.LogFormatter())
             axes.yaxis.set_major_formatter('{x:g}')
-            axes.yaxis.set_minor_formatter('{x:g}')
         if axes.get_legend_handles_labels()[0]:
             axes.legend(frameon=False, fontsize=8)
     with atomic_file(path) as file:
@@ -85,7 +90,7 @@ def _energies(axes: Axes, statistics: TrayStatistics) -> None:
             fmt='o',
             ms=3.5,
             lw=0.8,
-            color=_COLOURS[kind],
+            color=_COLOURS[kind % len(_COLOURS)],
             label=name + ratio,
         )
     axes.set_yscale('log')
@@ -107,14 +112,16 @@ def _velocities(axes: Axes, statistics: TrayStatistics) -> None:
             fmt='o',
             ms=3.0,
             lw=0.8,
-            color=_COLOURS[kind],
+            color=_COLOURS[kind % len(_COLOURS)],
             label=f'{name}: a2 {_text(shape.fourth_cumulant)}, '
             f'anisotropy {_text(shape.anisotropy)}',
         )
-        sonine = sonine_density(fine, shape.fourth_cumulant.value)
-        axes.plot(fine, np.where(sonine > 0.0, sonine, np.nan), color=_COLOURS[kind], lw=1)
+        if abs(shape.fourth_cumulant.value) <= _MOST_SONINE:
+            density = sonine_density(fine, shape.fourth_cumulant.value)
+            colour = _COLOURS[kind % len(_COLOURS)]
+            axes.plot(fine, np.where(density > 0.0, density, np.nan), color=colour, lw=1)
     axes.set_yscale('log')
-    axes.set_ylim(_LEAST_DENSITY, 2.0)
+    axes.set_ylim(_LEAST_DENSITY, _HIGHEST_DENSITY)
     axes.set_xlabel('component of velocity / its root mean square')
     axes.set_ylabel('probability density')
 
@@ -132,7 +139,7 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
             fmt='o',
             ms=3.5,
             lw=0.8,
-            color=_COLOURS[kind],
+            color=_COLOURS[kind % len(_COLOURS)],
             label=f'{name}: mean free path {_MM * rate.mean_free_path.value:.2f} ± '
             f'{_MM * rate.mean_free_path.error:.2f} mm',
         )
@@ -140,7 +147,7 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
         axes.plot(
             part.time[order],
             rate.theory_per_path * part.mean_projected_speed[order],
-            color=_COLOURS[kind],
+            color=_COLOURS[kind % len(_COLOURS)],
             lw=1,
             label=f'theory: {_MM * rate.theory_mean_free_path:.2f} mm',
         )
@@ -152,7 +159,7 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
 def _pairs(axes: Axes, statistics: TrayStatistics) -> None:
     axes.axhline(1.0, color=_REFERENCE, lw=1)
     highest = 0.0
-    for pair, colour in zip(statistics.pairs, _COLOURS, strict=False):
+    for pair, colour in zip(statistics.pairs, cycle(_COLOURS), strict=False):
         names = ' and '.join(statistics.tray.species[kind].material for kind in pair.species)
         distance = _MM * pair.distance
         axes.fill_between(
@@ -195,9 +202,9 @@ def _clustering(axes: Axes, statistics: TrayStatistics) -> None:
         lw=0,
         label='random places',
     )
-    onsets = [cycle.onset for cycle in statistics.clustering if math.isfinite(cycle.onset)]
-    for cycle in statistics.clustering:
-        axes.plot(cycle.time, cycle.value, 'o-', ms=3.0, lw=0.8, color=_COLOURS[0], alpha=0.7)
+    onsets = [part.onset for part in statistics.clustering if math.isfinite(part.onset)]
+    for part in statistics.clustering:
+        axes.plot(part.time, part.value, 'o-', ms=3.0, lw=0.8, color=_COLOURS[0], alpha=0.7)
     for onset in onsets:
         axes.axvline(onset, color=_COLOURS[1], lw=1)
     found = f'clustering from {min(onsets):.1f} s on' if onsets else 'no clustering'
