@@ -5,6 +5,7 @@ Tested by ``test/settings/test_prior_words.py``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ _MM = 1e3
 
 
 def priors_in_words(prior: PriorSettings) -> str:
-    """The priors of both restitutions, of drag and friction, and of the larger common errors.
+    """The priors of restitutions, drag, friction and start, and of the larger common errors.
 
     Parameters
     ----------
@@ -38,5 +39,7 @@ def priors_in_words(prior: PriorSettings) -> str:
         f'beads 0 to 1, walls {walls}; common errors: scale {prior.scale_error:g}, collisions '
         f'{prior.collision_bias:g}, rebounds {prior.rebound_bias:g}, diameter '
         f'{prior.diameter_error:g}, height {_MM * prior.height_error:g} mm; drag '
-        f'{prior.drag:g}{drag_error}; friction {prior.friction:g}{friction_error}'
+        f'{prior.drag:g}{drag_error}; friction {prior.friction:g}{friction_error}; mean speed at '
+        f'the start {_MM * prior.initial_speed:g} mm/s within a factor of '
+        f'{math.exp(prior.initial_speed_spread):.2g}'
     )
