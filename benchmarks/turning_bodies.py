@@ -26,7 +26,7 @@ _CONTROL_TRUTHS = (0.5, 0.9)
 _FIRST_CONTROL = 1000
 _CYCLES = 48
 _STICKING = (1e-3, 3e-3, 10e-3)
-# The issue asks for these: sticking speed, and first merge, [s].
+# Within which a sticking speed, and the time of a first merge, [s], count as right.
 _FACTOR, _ONSET = 1.3, 0.5
 
 

@@ -89,5 +89,11 @@ def assert_same_numbers(arrays, rounding, missed=None):
         else:
             assert len(left) <= 1, record_type
         same = expected[first : first + len(published)]
-        # The drag, near 0, is a mean of velocity changes that single precision rounds on the way.
-        np.testing.assert_allclose(published, same, rtol=rounding, atol=1e-8)
+        # Single precision on the way rounds speeds of contacts: an element near 0, such as a drag
+        # or an exponent, differs by a part of what it may be.
+        scale = np.nanmax(np.abs(same), axis=0, initial=0.0)
+        np.testing.assert_array_less(
+            np.abs(published - same)[np.isfinite(same)],
+            np.broadcast_to(rounding * scale + 1e-9, same.shape)[np.isfinite(same)],
+        )
+        np.testing.assert_array_equal(np.isnan(published), np.isnan(same))
