@@ -36,6 +36,8 @@ from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+LOWEST_WALL = 0.8
+"""Lowest restitution of the walls that is drawn; the default prior goes further down."""
 COUNT = 'NANOROCKS_FILM_COUNT'
 """Environment variable with the number of drawn films of each tray."""
 
@@ -111,20 +113,34 @@ def draw(films: Iterable[DrawnFilm]) -> None:
         run_tasks(_draw, missing, Workers(), progress.count)
 
 
-def measured(videos: Sequence[Path]) -> list[ReadFilm]:
-    """What is measured in each film; results of an earlier run of the same code are used."""
-    missing = {video.stem: video for video in videos if not _result_file(video).exists()}
+def measured(videos: Sequence[Path], lowest_wall: float | None = None) -> list[ReadFilm]:
+    """What is measured in each film; results of an earlier run of the same code are used.
+
+    Parameters
+    ----------
+    videos : sequence of Path
+    lowest_wall : float, optional
+        Lowest wall restitution, where it is told.
+    """
+    missing = {
+        video.stem: (video, lowest_wall)
+        for video in videos
+        if not _result_file(video, lowest_wall).exists()
+    }
     with Progress('measuring in films') as progress:
         run_tasks(_measure, missing, Workers(), progress.count)
     return [
-        ReadFilm(film=read_truth(video), result=pickle.loads(_result_file(video).read_bytes()))
+        ReadFilm(
+            film=read_truth(video),
+            result=pickle.loads(_result_file(video, lowest_wall).read_bytes()),
+        )
         for video in videos
     ]
 
 
 def _draw(film: DrawnFilm) -> None:
     """Draw the truth of a tray, and film it with a drawn camera."""
-    prior = PriorSettings(min_wall_restitution=0.8)
+    prior = PriorSettings(min_wall_restitution=LOWEST_WALL)
     random = np.random.default_rng([film.number, film.tray])
     beads = random.uniform(*DRAWN_PAIRS)
     walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
@@ -146,14 +162,16 @@ def _draw(film: DrawnFilm) -> None:
     write_drawn_film(film.stem, tray, simulation, _SECONDS, seed, moving=_MOVING)
 
 
-def _measure(video: Path) -> None:
-    path = _result_file(video)
+def _measure(video_and_wall: tuple[Path, float | None]) -> None:
+    video, lowest_wall = video_and_wall
+    path = _result_file(video, lowest_wall)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(path, pickle.dumps(measure(read_truth(video))))
+    write_bytes(path, pickle.dumps(measure(read_truth(video), lowest_wall)))
 
 
-def _result_file(video: Path) -> Path:
-    return folder() / f'measured_{_code_key()}' / f'{video.stem}.pickle'
+def _result_file(video: Path, lowest_wall: float | None) -> Path:
+    told = '' if lowest_wall is None else f'_walls_{round(1e3 * lowest_wall)}'
+    return folder() / f'measured_{_code_key()}' / f'{video.stem}{told}.pickle'
 
 
 @cache

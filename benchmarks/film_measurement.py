@@ -100,10 +100,19 @@ def is_flagged(estimate: CorEstimate) -> bool:
     return bool(estimate.quality & ~_HARMLESS)
 
 
-def measure(film: FilmTruth) -> FilmResult:
-    """Import a film into a temporary bag and push it through the pipeline."""
+def measure(film: FilmTruth, lowest_wall: float | None = None) -> FilmResult:
+    """Import a film into a temporary bag and push it through the pipeline.
+
+    Parameters
+    ----------
+    film : FilmTruth
+    lowest_wall : float, optional
+        Lowest wall restitution, where it is told.
+    """
     cv2.setNumThreads(1)
     settings = settings_for(film)
+    if lowest_wall is not None:
+        settings = with_values(settings, {'prior.min_wall_restitution': lowest_wall}, 'benchmark')
     with tempfile.TemporaryDirectory() as scratch:
         bag = Path(scratch) / 'bag'
         try:
