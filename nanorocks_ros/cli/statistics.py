@@ -130,8 +130,10 @@ def _write(folder: Path, statistics: dict[int, TrayStatistics]) -> None:
 
 
 def _print(statistics: TrayStatistics) -> None:
+    from nanorocks_ros.outputs.safe_text import counted
+
     print(
-        f'tray {statistics.tray.number}: {len(statistics.cycles)} cycles, '
+        f'tray {statistics.tray.number}: {counted(len(statistics.cycles), "cycle")}, '
         f'{statistics.seconds:.1f} s'
     )
     for kind, species in enumerate(statistics.tray.species):

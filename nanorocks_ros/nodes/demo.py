@@ -113,12 +113,13 @@ class DemoNode(NanorocksNode):
             [cor for cor in self._cors if cor.cycle == cycle],
             [truth for truth in self._truth if truth.cycle == cycle],
         )
+        source = headline_in_words(
+            final.headline, final.tension, final.wall_friction, final.quality
+        )
         print(
             f'walls {final.wall_restitution.value:.3f} [{final.wall_restitution.lower:.3f}, '
             f"{final.wall_restitution.upper:.3f}]; the paper's closed form says "
-            f'{final.paper_restitution:.3f}; from '
-            f'{headline_in_words(final.headline, final.tension, final.wall_friction)}; '
-            'see docs/method/restitution.md'
+            f'{final.paper_restitution:.3f}; from {source}; see docs/method/restitution.md'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 
