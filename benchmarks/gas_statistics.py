@@ -51,11 +51,11 @@ def _gas(
     return tray_statistics(tracks, tray, choices), tracks, np.array(pairs), np.array(bodies)
 
 
-def _temperature_ratios(found: TrayStatistics, tracks: list) -> tuple[list, list]:
+def _temperature_ratios(measured: TrayStatistics, tracks: list) -> tuple[list, list]:
     """Measured over true temperatures, and their deviations in stated errors."""
     times = np.arange(len(tracks)) / _RATE
     ratios, sigmas = [], []
-    for kind, part in enumerate(found.temperatures):
+    for kind, part in enumerate(measured.temperatures):
         true = np.array(
             [(record.velocities[record.species == kind] ** 2).mean() for record in tracks]
         )
@@ -67,16 +67,16 @@ def _temperature_ratios(found: TrayStatistics, tracks: list) -> tuple[list, list
     return ratios, sigmas
 
 
-def _collision_ratio(found: TrayStatistics, tracks: list, pairs: np.ndarray) -> tuple:
+def _collision_ratio(measured: TrayStatistics, tracks: list, pairs: np.ndarray) -> tuple:
     """Measured over counted collisions, its error, and theory over counted ones."""
     first = round(_START * _RATE)
     measured, variance, theory = 0.0, 0.0, 0.0
-    for kind, rate in enumerate(found.collisions):
+    for kind, rate in enumerate(measured.collisions):
         speeds = [
             np.hypot(*record.velocities[record.species == kind].T).mean()
             for record in tracks[first:]
         ]
-        path = 0.5 * found.tray.species[kind].count * np.sum(speeds) / _RATE
+        path = 0.5 * measured.tray.species[kind].count * np.sum(speeds) / _RATE
         measured += rate.per_path.value * path
         variance += (rate.per_path.error * path) ** 2
         theory += rate.theory_per_path * path
@@ -94,12 +94,12 @@ def report() -> None:
     for lost in (0.0, 0.1):
         for number, restitution in _CASES:
             runs = [_gas(number, run, restitution, 0.0, lost) for run in range(_RUNS)]
-            parts = [_temperature_ratios(found, tracks) for found, tracks, _, _ in runs]
+            parts = [_temperature_ratios(measured, tracks) for measured, tracks, _, _ in runs]
             ratios = [ratio for part, _ in parts for ratio in part]
             sigmas = [sigma for _, part in parts for sigma in part]
             rates = np.array([_collision_ratio(*run[:3]) for run in runs])
             covered = int((np.abs(rates[:, 0] - 1.0) < 2.0 * rates[:, 1]).sum())
-            cumulants = [found.velocities[0].fourth_cumulant for found, *_ in runs]
+            cumulants = [measured.velocities[0].fourth_cumulant for measured, *_ in runs]
             values = np.array([cumulant.value for cumulant in cumulants])
             name = f'{number}, {restitution:g}' + (f', {lost:.0%} not seen' if lost else '')
             print(
@@ -114,7 +114,7 @@ def report() -> None:
     print('| --- | --- | --- | --- |')
     for sticking in _STICKING:
         runs = [_gas(1, run, 0.89, sticking) for run in range(_RUNS)]
-        onsets = np.array([found.clustering[0].onset for found, *_ in runs])
+        onsets = np.array([measured.clustering[0].onset for measured, *_ in runs])
         known = np.isfinite(onsets)
         left = [
             bodies[round(onset * _RATE)]

@@ -61,10 +61,8 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, print and write, and return the exit code."""
-    from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.track import tracked_bag
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.studies.analysis.bag_tracks import track_bag
     from nanorocks_ros.studies.gas_statistics.statistics_files import statistics_values
     from nanorocks_ros.studies.gas_statistics.tray_statistics import GasChoices
 
@@ -76,13 +74,7 @@ def run(options: argparse.Namespace) -> int:
     )
     folder = Path(options.output) if options.output else None
     check_outputs({'--output': folder} if folder else {}, {})
-    settings, assumed, _ = bag_settings(options, options.bag)
-    with Progress('tracking') as progress:
-        bag = track_bag(
-            Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
-        )
-    for notice in (*assumed, *bag.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    bag = tracked_bag(options)
     statistics = _measure(bag, choices)
     if options.json:
         trays = {str(number): statistics_values(tray) for number, tray in statistics.items()}

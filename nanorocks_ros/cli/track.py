@@ -45,20 +45,11 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
-    from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.studies.analysis.bag_tracks import track_bag
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
-    settings, assumed, _ = bag_settings(options, options.bag)
-    with Progress('tracking') as progress:
-        bag = track_bag(
-            Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
-        )
-    for notice in (*assumed, *bag.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    bag = tracked_bag(options)
     compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:
         print(json.dumps(_as_json(bag, compared), allow_nan=False))
@@ -66,6 +57,22 @@ def run(options: argparse.Namespace) -> int:
         _print(bag, compared)
     _write(options, bag)
     return 0
+
+
+def tracked_bag(options: argparse.Namespace) -> TrackedBag:
+    """Track the beads of the bag of the options, with progress; print what is to be known."""
+    from nanorocks_ros.cli.flags import bag_settings
+    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.studies.analysis.bag_tracks import track_bag
+
+    settings, assumed, _ = bag_settings(options, options.bag)
+    with Progress('tracking') as progress:
+        bag = track_bag(
+            Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
+        )
+    for notice in (*assumed, *bag.notices):
+        print(f'nanorocks: {notice}', file=sys.stderr)
+    return bag
 
 
 def _check_outputs(options: argparse.Namespace) -> None:

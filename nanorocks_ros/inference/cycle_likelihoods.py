@@ -130,7 +130,6 @@ class CycleLikelihoods:
                     friction=arrays['contacts.friction'],
                     rebound_losses=arrays['contacts.rebound_losses'],
                     collision_losses=arrays['contacts.collision_losses'],
-                    rubbed=arrays['contacts.rubbed'],
                     rebound_impacts=arrays['contacts.rebound_impacts'],
                     collision_impacts=arrays['contacts.collision_impacts'],
                 ),

@@ -145,7 +145,7 @@ def restitution_sources(
     if headline is Headline.CONTACTS:
         slowing = losses.rubbed if losses else NO_SLOWING
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-        wall_likelihood = _with_friction(contacts, prior, slowing)
+        wall_likelihood = _with_friction(contacts, prior, slowing.drag)
     return RestitutionSources(
         joint=joint,
         decay=posterior_of(tables, log_likelihood, walls) if number else joint,
@@ -158,15 +158,16 @@ def restitution_sources(
 
 
 def _with_friction(
-    contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
+    contacts: ContactTerms, prior: PriorSettings, drag: Measured
 ) -> Likelihood1D | None:
     """Log likelihood of the wall restitution where floor and lid rub as the walls do."""
     wide = replace(prior, friction_error=_WIDER * prior.friction_error)
     weights = friction_weights(wide, contacts)
     if weights is None:
-        return contacts.wall_likelihood(prior.rebound_bias, slowing)
+        # Only where there are no rebounds.
+        return None
     return contacts.rubbed_wall_likelihood(
-        prior.rebound_bias, slowing.drag, (weights.friction, weights.weight)
+        prior.rebound_bias, drag, (weights.friction, weights.weight)
     )
 
 

@@ -22,7 +22,7 @@ FRICTION_SIGMAS = 1.645
 # Flags with which the decay does not count.
 _FLAGGED = {
     Quality.ACCELERATED: 'an acceleration drives the beads',
-    Quality.SPEED_DEPENDENT: 'the restitution depends on the impact speed',
+    Quality.SPEED_DEPENDENT: 'contacts at different speeds contradict a constant restitution',
 }
 
 

@@ -108,7 +108,8 @@ FLAGS = {
         'the restitutions are those of contacts alone; compare acceleration with the flight log',
     ),
     Quality.SPEED_DEPENDENT: Words(
-        'the restitution depends on the impact speed, so that one number does not describe it',
+        'contacts at different speeds contradict a constant restitution, in 5 % of cycles by '
+        'chance',
         'the restitutions are those of contacts alone, near impact_speed and wall_impact_speed; '
         'restitution_exponent and wall_restitution_exponent say how 1 - restitution goes with '
         'speed',

@@ -128,7 +128,10 @@ def test_the_headline_and_its_reason(contacts, tension, friction, expected, word
     ('quality', 'words'),
     [
         (Quality.ACCELERATED, 'since an acceleration drives the beads'),
-        (Quality.SPEED_DEPENDENT, 'since the restitution depends on the impact speed'),
+        (
+            Quality.SPEED_DEPENDENT,
+            'since contacts at different speeds contradict a constant',
+        ),
     ],
 )
 def test_a_flag_with_which_the_decay_does_not_count_is_the_reason(quality, words):

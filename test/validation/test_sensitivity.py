@@ -85,14 +85,14 @@ def test_a_tilted_camera_sees_motion_along_its_axis():
 # Their masses are not those of the diameter that is told, so collisions seem to lose momentum.
 def test_collisions_of_beads_that_differ_are_found_where_the_range_of_diameters_is_told():
     name = 'diameters spread by 5 %'
-    found = [
+    measured = [
         sum(
             isinstance(contact, PairCollision)
             for contact in contacts_of(tray, iter(tracks(1, name)))
         )
         for tray in (TOLD[1], true_tray(TOLD[1], row(name)))
     ]
-    assert found[1] > 2 * found[0] > 0
+    assert measured[1] > 2 * measured[0] > 0
 
 
 def test_an_acceleration_is_noticed_and_the_decay_not_believed():

@@ -17,7 +17,7 @@ from nanorocks_ros.inference.contacts.contact_likelihood import (
 from nanorocks_ros.inference.contacts.dragged_contacts import loss_beside_contacts, loss_sums
 from nanorocks_ros.inference.contacts.impact_tables import collision_impacts, rebound_impacts
 from nanorocks_ros.inference.contacts.restitution_exponent import bead_exponent, wall_exponent
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rebound_columns, rubbed_likelihood
+from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
 from nanorocks_ros.inference.contacts.wall_friction import (
     friction_likelihood,
     friction_table,
@@ -61,8 +61,6 @@ class ContactTerms:
         Table of `friction_table`.
     rebound_losses, collision_losses : ndarray (4,)
         Sums of `loss_sums`.
-    rubbed : ndarray (n, 12)
-        Of `rebound_columns`, for what floor and lid take off.
     rebound_impacts, collision_impacts : ndarray (n, columns)
         Rows of `rebound_impacts` and `collision_impacts`.
     """
@@ -74,8 +72,7 @@ class ContactTerms:
     friction: NDArray[np.float64]
     rebound_losses: NDArray[np.float64]
     collision_losses: NDArray[np.float64]
-    rubbed: NDArray[np.float64]
-    rebound_impacts: NDArray[np.float32]
+    rebound_impacts: NDArray[np.float64]
     collision_impacts: NDArray[np.float32]
 
     @classmethod
@@ -92,7 +89,6 @@ class ContactTerms:
             friction=friction_table(rebounds),
             rebound_losses=loss_sums(rebounds),
             collision_losses=loss_sums(collisions),
-            rubbed=rebound_columns(rebounds),
             rebound_impacts=rebound_impacts(rebounds),
             collision_impacts=collision_impacts(collisions),
         )
@@ -106,7 +102,6 @@ class ContactTerms:
             friction=self.friction + other.friction,
             rebound_losses=self.rebound_losses + other.rebound_losses,
             collision_losses=self.collision_losses + other.collision_losses,
-            rubbed=np.concatenate([self.rubbed, other.rubbed]),
             rebound_impacts=np.concatenate([self.rebound_impacts, other.rebound_impacts]),
             collision_impacts=np.concatenate([self.collision_impacts, other.collision_impacts]),
         )
@@ -157,7 +152,7 @@ class ContactTerms:
         """
         if not self.rebounds:
             return None
-        return rubbed_likelihood(self.rubbed, drag, friction).convolved(bias)
+        return rubbed_likelihood(self.rebound_impacts, drag, friction).convolved(bias)
 
     def bead_likelihood(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING

@@ -5,11 +5,13 @@ camera sees approach and parting along the projected line of centres; their sum 
 speed times 1 + restitution times the horizontal part of the line of centres, whatever the
 vertical velocities. So the impact speed follows from both with the restitution.
 
-Tested by ``test/inference/contacts/test_restitution_exponent.py``.
+Tested by ``test/inference/contacts/test_restitution_exponent.py`` and
+``test/inference/contacts/test_rubbed_rebounds.py``.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,10 +36,19 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import PairCollision, Rebound
 
 LOSS_COLUMNS = 3
+DRAG_TIME, FRICTION_LENGTH, DRAG = range(LOSS_COLUMNS)
 """First columns of each row: drag time, [s], friction length, [m], and drag taken out, [1/s]."""
-REBOUND_COLUMNS = LOSS_COLUMNS + 5
-"""Columns of a rebound: besides, incoming and outgoing speed, their errors, and that of the wall
-velocity, [m/s]."""
+REBOUND_COLUMNS = LOSS_COLUMNS + 11
+"""Columns of a rebound, beside those."""
+INCOMING, OUTGOING, INCOMING_ERROR, OUTGOING_ERROR, WALL_ERROR = range(
+    LOSS_COLUMNS, LOSS_COLUMNS + 5
+)
+"""Of a rebound: normal speeds, their errors and that of the wall velocity, [m/s]."""
+(VERTICAL_BEFORE, VERTICAL_AFTER, HITS_BEFORE, HITS_AFTER, DRAG_TIME_BEFORE, DRAG_TIME_AFTER) = (
+    range(WALL_ERROR + 1, REBOUND_COLUMNS)
+)
+"""Of the flight before and after a rebound: root mean square vertical speed over the speed of the
+bead, hits of floor or lid at that vertical speed, drag time, [s]."""
 NODES = 51
 """Restitutions from 0 to 1 at which a collision has its log likelihood."""
 COLLISION_COLUMNS = LOSS_COLUMNS + 1 + 2 * NODES
@@ -52,22 +63,40 @@ _RATIO = VERTICAL_RATIOS[len(VERTICAL_RATIOS) // 2]
 _RADIUS_ERROR = RADIUS_ERRORS[len(RADIUS_ERRORS) // 2]
 
 
-def rebound_impacts(rebounds: Sequence[Rebound]) -> NDArray[np.float32]:
+def rebound_impacts(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
     """A row for each rebound, (n, REBOUND_COLUMNS)."""
-    rows = [
-        (
-            rebound.incoming_drag_time + rebound.outgoing_drag_time,
-            rebound.friction_length,
-            rebound.drag,
-            rebound.incoming.value,
-            rebound.outgoing.value,
-            rebound.incoming.error,
-            rebound.outgoing.error,
-            rebound.wall_velocity.error,
-        )
-        for rebound in rebounds
-    ]
-    return np.array(rows, dtype=np.float32).reshape(-1, REBOUND_COLUMNS)
+    rows = [_of_rebound(rebound) for rebound in rebounds]
+    return np.array(rows, dtype=np.float64).reshape(-1, REBOUND_COLUMNS)
+
+
+def _of_rebound(rebound: Rebound) -> tuple[float, ...]:
+    before = math.hypot(rebound.incoming.value, rebound.tangential_incoming)
+    after = math.hypot(rebound.outgoing.value, rebound.tangential_outgoing)
+    # No temperature where no speed was known.
+    vertical = math.sqrt(rebound.temperature) if rebound.temperature > 0.0 else 0.0
+    drag_time = rebound.incoming_drag_time + rebound.outgoing_drag_time
+    hits = 0.0
+    if vertical * rebound.free_height * drag_time > 0.0:
+        time = rebound.friction_length * 0.5 * (before + after) / rebound.temperature
+        # In both flights, each twice as long as from its middle to the contact.
+        hits = 2.0 * time * vertical / rebound.free_height
+        hits /= drag_time
+    return (
+        drag_time,
+        rebound.friction_length,
+        rebound.drag,
+        rebound.incoming.value,
+        rebound.outgoing.value,
+        rebound.incoming.error,
+        rebound.outgoing.error,
+        rebound.wall_velocity.error,
+        vertical / before,
+        vertical / after if after > 0.0 else 0.0,
+        hits * rebound.incoming_drag_time,
+        hits * rebound.outgoing_drag_time,
+        rebound.incoming_drag_time,
+        rebound.outgoing_drag_time,
+    )
 
 
 def collision_impacts(collisions: Sequence[PairCollision]) -> NDArray[np.float32]:

@@ -17,7 +17,16 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import OUTLIERS
 from nanorocks_ros.inference.contacts.dragged_contacts import FRICTION_FACTOR, FRICTION_SPREAD
-from nanorocks_ros.inference.contacts.impact_tables import LOSS_COLUMNS, NODES
+from nanorocks_ros.inference.contacts.impact_tables import (
+    FRICTION_LENGTH,
+    INCOMING,
+    INCOMING_ERROR,
+    LOSS_COLUMNS,
+    NODES,
+    OUTGOING,
+    OUTGOING_ERROR,
+    WALL_ERROR,
+)
 from nanorocks_ros.inference.contacts.projected_collisions import RANGE
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.numerics.compiled import compiled, inlined
@@ -87,7 +96,7 @@ class RestitutionExponent:
 
 
 def wall_exponent(
-    impacts: NDArray[np.float32], scale: float, slowing: Slowing, bias: float
+    impacts: NDArray[np.float64], scale: float, slowing: Slowing, bias: float
 ) -> RestitutionExponent | None:
     """Exponent of the walls from rebounds; None where these are too few.
 
@@ -141,13 +150,13 @@ class _Impacts(Protocol):
 
 
 class _Rebounds:
-    def __init__(self, impacts: NDArray[np.float32], scale: float) -> None:
-        self.rows = impacts.astype(np.float64)
-        self.rows[:, LOSS_COLUMNS + 2 :] *= scale
+    def __init__(self, impacts: NDArray[np.float64], scale: float) -> None:
+        self.rows = impacts.copy()
+        self.rows[:, [INCOMING_ERROR, OUTGOING_ERROR, WALL_ERROR]] *= scale
 
     @property
     def speeds(self) -> NDArray[np.float64]:
-        return self.rows[:, LOSS_COLUMNS]
+        return self.rows[:, INCOMING]
 
     def logs(
         self,
@@ -184,7 +193,7 @@ def _exponent(impacts: _Impacts, slowing: Slowing, bias: float) -> RestitutionEx
         return None
     reference = math.exp(float(np.log(impacts.speeds).mean()))
     kept = _kept(impacts, slowing)
-    rubbed = FRICTION_FACTOR * float(slowing.values[1] * impacts.rows[:, 1].mean())
+    rubbed = FRICTION_FACTOR * float(slowing.values[1] * impacts.rows[:, FRICTION_LENGTH].mean())
     bias = math.hypot(bias, _RUBBING_ERROR * rubbed)
     restitutions = _likely_restitutions(impacts, kept.mean(axis=0), reference)
     by_slowing = [impacts.logs(part, reference, restitutions, EXPONENTS) for part in kept]
@@ -244,8 +253,9 @@ def _rebound_logs(
     """Log likelihood, (r, p), of rebounds."""
     table = np.zeros((restitutions.size, exponents.size))
     for i in range(rows.shape[0]):
-        incoming, outgoing = rows[i, LOSS_COLUMNS], rows[i, LOSS_COLUMNS + 1]
-        before, after, wall = rows[i, -3], rows[i, -2], rows[i, -1]
+        incoming, outgoing = rows[i, INCOMING], rows[i, OUTGOING]
+        before, after = rows[i, INCOMING_ERROR], rows[i, OUTGOING_ERROR]
+        wall = rows[i, WALL_ERROR]
         outlier = OUTLIERS / (RANGE * incoming)
         for k in range(exponents.size):
             power = (incoming / reference) ** exponents[k]

@@ -16,20 +16,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import ERROR_SCALES, OUTLIERS, marginal
+from nanorocks_ros.inference.contacts.impact_tables import (
+    DRAG,
+    DRAG_TIME_AFTER,
+    DRAG_TIME_BEFORE,
+    HITS_AFTER,
+    HITS_BEFORE,
+    INCOMING,
+    INCOMING_ERROR,
+    OUTGOING,
+    OUTGOING_ERROR,
+    VERTICAL_AFTER,
+    VERTICAL_BEFORE,
+    WALL_ERROR,
+)
 from nanorocks_ros.inference.contacts.projected_collisions import RANGE
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.log_sums import log_sum
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from nanorocks_ros.records import Measured, Rebound
-
-COLUMNS = 12
-"""Numbers that are kept of a rebound."""
+    from nanorocks_ros.records import Measured
 
 # Change of the vertical speed at a hit over the speed before it: 1 and a restitution.
 _CHANGE = 1.95
@@ -50,42 +59,8 @@ _FARTHEST = 6.0
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
-def rebound_columns(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
-    """What `rubbed_table` needs of rebounds, (n, 12); those of more rebounds are concatenated."""
-    rows = [_row(rebound) for rebound in rebounds]
-    return np.array(rows, dtype=np.float64).reshape(-1, COLUMNS)
-
-
-def _row(rebound: Rebound) -> tuple[float, ...]:
-    before = math.hypot(rebound.incoming.value, rebound.tangential_incoming)
-    after = math.hypot(rebound.outgoing.value, rebound.tangential_outgoing)
-    # No temperature where no speed was known.
-    vertical = math.sqrt(rebound.temperature) if rebound.temperature > 0.0 else 0.0
-    drag_time = rebound.incoming_drag_time + rebound.outgoing_drag_time
-    hits = 0.0
-    if vertical * rebound.free_height * drag_time > 0.0:
-        time = rebound.friction_length * 0.5 * (before + after) / rebound.temperature
-        # In both flights, each twice as long as from its middle to the contact.
-        hits = 2.0 * time * vertical / rebound.free_height
-        hits /= drag_time
-    return (
-        rebound.incoming.value,
-        rebound.outgoing.value,
-        rebound.incoming.error,
-        rebound.outgoing.error,
-        rebound.wall_velocity.error,
-        vertical / before,
-        vertical / after if after > 0.0 else 0.0,
-        hits * rebound.incoming_drag_time,
-        hits * rebound.outgoing_drag_time,
-        rebound.incoming_drag_time,
-        rebound.outgoing_drag_time,
-        rebound.drag,
-    )
-
-
 def rubbed_likelihood(
-    columns: NDArray[np.float64],
+    impacts: NDArray[np.float64],
     drag: Measured,
     friction: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> Likelihood1D:
@@ -93,8 +68,8 @@ def rubbed_likelihood(
 
     Parameters
     ----------
-    columns : ndarray (n, 12)
-        From `rebound_columns`.
+    impacts : ndarray (n, REBOUND_COLUMNS)
+        From `rebound_impacts`.
     drag : Measured, [1/s]
         Of the gas, for the first species; where it is not below 0 its true value is not, either.
     friction : tuple of 2 ndarrays (n,)
@@ -108,14 +83,14 @@ def rubbed_likelihood(
     weights = np.bincount(below, friction[1] * (1.0 + below - places), _FRICTIONS.size)
     weights += np.bincount(below + 1, friction[1] * (places - below), _FRICTIONS.size)
     likely = weights > _UNLIKELY * weights.max()
-    table = rubbed_table(columns, _WALLS, _FRICTIONS[likely], drags)
+    table = rubbed_table(impacts, _WALLS, _FRICTIONS[likely], drags)
     by_friction = [marginal(rows.reshape(-1, _WALLS.size)) for rows in table]
     logs = log_sum(np.array(by_friction), weights[likely])
     return Likelihood1D(restitution=_WALLS, log_likelihood=logs)
 
 
 def rubbed_table(
-    columns: NDArray[np.float64],
+    impacts: NDArray[np.float64],
     grid: NDArray[np.float64],
     frictions: NDArray[np.float64],
     drags: NDArray[np.float64],
@@ -124,8 +99,8 @@ def rubbed_table(
 
     Parameters
     ----------
-    columns : ndarray (n, 12)
-        From `rebound_columns`.
+    impacts : ndarray (n, REBOUND_COLUMNS)
+        From `rebound_impacts`.
     grid : ndarray (n_grid,)
         Restitutions of the side walls, rising.
     frictions : ndarray (n_frictions,)
@@ -140,8 +115,8 @@ def rubbed_table(
     """
     scales = np.array(ERROR_SCALES)
     table = np.zeros((frictions.size, drags.size, scales.size, grid.size))
-    for row in columns:
-        _add_rebound(row, grid, (frictions, drags, scales), table)
+    for impact in impacts:
+        _add_rebound(impact, grid, (frictions, drags, scales), table)
     return table
 
 
@@ -152,7 +127,7 @@ _SHARES /= _SHARES.sum() * _PHASES
 
 @compiled
 def _add_rebound(
-    row: NDArray[np.float64],
+    impact: NDArray[np.float64],
     grid: NDArray[np.float64],
     axes: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     table: NDArray[np.float64],
@@ -162,14 +137,15 @@ def _add_rebound(
     remains, weights = np.empty(_SPEEDS * _PHASES), np.empty(_SPEEDS * _PHASES)
     errors, density = np.empty(grid.size), np.empty((scales.size, grid.size))
     for n in range(grid.size):
-        own, wall = grid[n] * row[2], (1.0 + grid[n]) * row[4]
-        errors[n] = math.sqrt(own * own + row[3] * row[3] + wall * wall)
+        own, wall = grid[n] * impact[INCOMING_ERROR], (1.0 + grid[n]) * impact[WALL_ERROR]
+        errors[n] = math.sqrt(own * own + impact[OUTGOING_ERROR] ** 2 + wall * wall)
     for i in range(frictions.size):
-        nodes = _remaining_speeds(row, _CHANGE * frictions[i], remains, weights)
+        nodes = _remaining_speeds(impact, _CHANGE * frictions[i], remains, weights)
         for j in range(drags.size):
-            before = row[0] * math.exp((row[11] - drags[j]) * row[9])
-            after = row[1] * math.exp((drags[j] - row[11]) * row[10])
-            density[:] = OUTLIERS / (RANGE * row[0])
+            extra = drags[j] - impact[DRAG]
+            before = impact[INCOMING] * math.exp(-extra * impact[DRAG_TIME_BEFORE])
+            after = impact[OUTGOING] * math.exp(extra * impact[DRAG_TIME_AFTER])
+            density[:] = OUTLIERS / (RANGE * impact[INCOMING])
             for node in range(nodes):
                 speeds = before * remains[node], after
                 _add_density(
@@ -204,7 +180,7 @@ def _add_density(
 
 @compiled
 def _remaining_speeds(
-    row: NDArray[np.float64],
+    impact: NDArray[np.float64],
     friction: float,
     remains: NDArray[np.float64],
     weights: NDArray[np.float64],
@@ -214,16 +190,16 @@ def _remaining_speeds(
     `friction` is what a hit takes off, over the vertical speed. Returns the number of parts; parts
     that differ by much less than the errors are one.
     """
-    alike, nodes = _ALIKE * row[3] / row[1], 0
+    alike, nodes = _ALIKE * impact[OUTGOING_ERROR] / impact[OUTGOING], 0
     for k in range(_SPEEDS):
         speed = _VERTICAL[k]
         for phase in range(_PHASES):
             # Shifted from speed to speed, so that few losses are alike.
             first = (phase + (_GOLDEN * (k + 1)) % 1.0) / _PHASES
-            hits = _hits(first / speed, 1.0 / speed, row[7])
-            part = max(1.0 - friction * speed * row[5] * hits, _LEAST)
-            hits = _hits((1.0 - first) / speed, 1.0 / speed, row[8])
-            part /= 1.0 + friction * speed * row[6] * hits
+            hits = _hits(first / speed, 1.0 / speed, impact[HITS_BEFORE])
+            part = max(1.0 - friction * speed * impact[VERTICAL_BEFORE] * hits, _LEAST)
+            hits = _hits((1.0 - first) / speed, 1.0 / speed, impact[HITS_AFTER])
+            part /= 1.0 + friction * speed * impact[VERTICAL_AFTER] * hits
             node = 0
             while node < nodes and abs(part - remains[node]) > alike:
                 node += 1

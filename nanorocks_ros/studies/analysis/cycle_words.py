@@ -230,7 +230,7 @@ def _exponent_lines(cor: CorEstimate) -> list[str]:
     ]
     if not parts:
         return []
-    seen = 'depends' if Quality.SPEED_DEPENDENT in cor.quality else 'need not depend'
+    seen = 'seems to depend' if Quality.SPEED_DEPENDENT in cor.quality else 'need not depend'
     return [
         f'  restitution {seen} on the impact speed; exponent of 1 - restitution: '
         f'{", ".join(parts)}'

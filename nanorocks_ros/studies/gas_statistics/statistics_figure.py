@@ -207,8 +207,8 @@ def _clustering(axes: Axes, statistics: TrayStatistics) -> None:
         axes.plot(part.time, part.value, 'o-', ms=3.0, lw=0.8, color=_COLOURS[0], alpha=0.7)
     for onset in onsets:
         axes.axvline(onset, color=_COLOURS[1], lw=1)
-    found = f'clustering from {min(onsets):.1f} s on' if onsets else 'no clustering'
-    axes.set_title(found, fontsize=10)
+    title = f'clustering from {min(onsets):.1f} s on' if onsets else 'no clustering'
+    axes.set_title(title, fontsize=10)
     axes.set_ylim(0.0, None)
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('S of the long waves')

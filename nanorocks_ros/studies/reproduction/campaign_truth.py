@@ -38,12 +38,12 @@ _TRUTH_STEP, _TRACKS_STEP = 0.2, 0.5
 class TrackedShares(NamedTuple):
     """Tracked beads after shaking, as shares of the beads that are no grains.
 
-    `detected`: all detections, as the paper counts; `found`: beads with a detection on them;
+    `detected`: all detections, as the paper counts; `matched`: beads with a detection on them;
     `spurious`: detections on no bead.
     """
 
     detected: float
-    found: float
+    matched: float
     spurious: float
 
 

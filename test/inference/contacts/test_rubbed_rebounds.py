@@ -12,7 +12,8 @@ from contact_draws import drawn_rebounds
 from nanorocks_ros.inference.contacts.contact_likelihood import rebound_log_likelihood
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rebound_columns, rubbed_likelihood
+from nanorocks_ros.inference.contacts.impact_tables import rebound_impacts
+from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import Measured
 
@@ -70,13 +71,13 @@ def _rebounds(seed, n, friction):
 
 
 def _quantiles(rebounds, friction, drag=NO_DRAG):
-    likelihood = rubbed_likelihood(rebound_columns(list(rebounds)), drag, friction)
+    likelihood = rubbed_likelihood(rebound_impacts(list(rebounds)), drag, friction)
     return likelihood.posterior((0.5, 1.0)).quantiles(ENDS)
 
 
 def test_without_friction_the_likelihood_is_that_of_a_rebound():
     rebounds = list(_rebounds(1, 20, 0.0))
-    likelihood = rubbed_likelihood(rebound_columns(rebounds), NO_DRAG, _only(0.0))
+    likelihood = rubbed_likelihood(rebound_impacts(rebounds), NO_DRAG, _only(0.0))
     plain = rebound_log_likelihood(rebounds, likelihood.restitution)
     likely = plain > plain.max() - 15.0
     np.testing.assert_allclose(
@@ -88,10 +89,10 @@ def test_without_friction_the_likelihood_is_that_of_a_rebound():
 
 def test_losses_of_floor_and_lid_are_told_from_those_of_the_wall():
     cycles = [list(_rebounds(seed, 40, 0.02)) for seed in range(12)]
-    found = np.array([_quantiles(cycle, _any()) for cycle in cycles])
-    holds = (found[:, 0] <= RESTITUTION) & (found[:, 2] >= RESTITUTION)
+    quantiles = np.array([_quantiles(cycle, _any()) for cycle in cycles])
+    holds = (quantiles[:, 0] <= RESTITUTION) & (quantiles[:, 2] >= RESTITUTION)
     assert holds.mean() >= 0.75
-    assert found[:, 1].mean() == pytest.approx(RESTITUTION, abs=0.004)
+    assert quantiles[:, 1].mean() == pytest.approx(RESTITUTION, abs=0.004)
     blind = np.array([_quantiles(cycle, _only(0.0)) for cycle in cycles])
     assert blind[:, 1].mean() < RESTITUTION - 0.01
 
@@ -126,9 +127,9 @@ def test_each_rebound_is_read_at_the_drag_and_with_its_error():
 
 
 def test_a_friction_between_two_nodes_is_a_mixture_of_both():
-    columns = rebound_columns(list(_rebounds(4, 30, 0.02)))
+    impacts = rebound_impacts(list(_rebounds(4, 30, 0.02)))
     low, middle, high = (
-        np.exp(rubbed_likelihood(columns, NO_DRAG, _only(friction)).log_likelihood)
+        np.exp(rubbed_likelihood(impacts, NO_DRAG, _only(friction)).log_likelihood)
         for friction in (0.015, 0.02, 0.025)
     )
     np.testing.assert_allclose(middle, 0.5 * (low + high), rtol=1e-9)

@@ -55,8 +55,8 @@ def test_frictions_are_compared_up_to_the_next_one_above_the_highest(tables):
     assert [friction for friction, _ in whole.rough] == list(FRICTIONS)
     some = decay_likelihood(tables, *decay, highest_friction=0.01)
     assert [friction for friction, _ in some.rough] == [0.004, 0.012]
-    for (_, one), (_, other) in zip(some.rough, whole.rough, strict=False):
-        np.testing.assert_array_equal(one.log_likelihood, other.log_likelihood)
+    for (_, part), (_, same) in zip(some.rough, whole.rough, strict=False):
+        np.testing.assert_array_equal(part.log_likelihood, same.log_likelihood)
     none = decay_likelihood(tables, *decay, highest_friction=0.0)
     assert none.rough == ()
     np.testing.assert_array_equal(none.integrated(), whole.integrated())

@@ -45,21 +45,21 @@ def test_a_broken_bond_is_reported_while_other_pairs_meet(odd):
 def test_time_in_which_a_bead_is_hidden_is_no_time_beside_each_other(hidden, bonds):
     # Encounters and collisions as in tray 5; free beads part within some hundredths of a second.
     finder = BondFinder(1e3, lambda radii, _: np.full_like(radii, 1e3))
-    positions, found = [(0.0, 0.0), (2.0 * RADIUS, 0.0)], []
+    positions, bonded = [(0.0, 0.0), (2.0 * RADIUS, 0.0)], []
     for number in range(30):
         seen = 1 if hidden and 2 <= number < 28 else 2
         new, _ = finder.push(number / 30.0, _beads(positions[:seen], speed=1e-2), 1e-9)
-        found += [bond.ids for bond in new]
-    assert found == bonds
+        bonded += [bond.ids for bond in new]
+    assert bonded == bonds
 
 
 @pytest.mark.parametrize(('cools', 'bonds'), [(True, []), (False, [(0, 1)])])
 def test_a_gas_that_came_to_rest_parts_no_pair(cools, bonds):
     # The first velocities of beads at rest are those of noise: 10 mm/s, then 0.1.
     finder = BondFinder(1e3, lambda radii, _: np.full_like(radii, 1e3))
-    positions, found = [(0.0, 0.0), (2.0 * RADIUS, 0.0)], []
+    positions, bonded = [(0.0, 0.0), (2.0 * RADIUS, 0.0)], []
     for number in range(30):
         speed = 1e-4 if cools and number > 1 else 1e-2
         new, _ = finder.push(number / 30.0, _beads(positions, speed=speed), 1e-9)
-        found += [bond.ids for bond in new]
-    assert found == bonds
+        bonded += [bond.ids for bond in new]
+    assert bonded == bonds

@@ -37,8 +37,8 @@ def test_two_cycles_count_as_one_gas(statistics):
     assert both.cycles == (1, 2)
     assert both.seconds == pytest.approx(2.0 * statistics.seconds)
     assert [cycle.cycle for cycle in both.clustering] == [1, 2]
-    one, two = statistics.velocities[1], both.velocities[1]
-    assert two.density_error.mean() < one.density_error.mean()
+    of_first, of_both = statistics.velocities[1], both.velocities[1]
+    assert of_both.density_error.mean() < of_first.density_error.mean()
     first = both.temperatures[0].cycle == 1
     assert both.temperatures[0].energy[first] == pytest.approx(statistics.temperatures[0].energy)
 
@@ -112,7 +112,7 @@ def test_a_crowded_tray_has_no_collision_rates_but_all_else():
     gas = tracked_gas(1, 0)
     flat = replace(gas.tray, dimensions=(*gas.tray.dimensions[:2], 0.0021))
     crowded = replace(flat, species=(replace(flat.species[0], count=33),))
-    found = tray_statistics(gas.tracks, crowded)
-    assert found.collisions == (None,)
-    assert 'no collision rates' in found.notices[0]
-    assert math.isfinite(found.velocities[0].fourth_cumulant.value)
+    limited = tray_statistics(gas.tracks, crowded)
+    assert limited.collisions == (None,)
+    assert 'no collision rates' in limited.notices[0]
+    assert math.isfinite(limited.velocities[0].fourth_cumulant.value)

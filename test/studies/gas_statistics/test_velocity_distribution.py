@@ -69,12 +69,12 @@ def heavy(rng, n):
 )  # fmt: skip
 def test_known_distributions_are_recovered(draw, cumulant, anisotropy):
     shapes = [velocity_distribution(drawn_samples(draw, seed=seed), 0) for seed in range(6)]
-    for found, true in (
+    for measured, true in (
         ([shape.fourth_cumulant for shape in shapes], cumulant),
         ([shape.anisotropy for shape in shapes], anisotropy),
         ([shape.correlation for shape in shapes], 0.0),
     ):
-        sigmas = [(value.value - true) / value.error for value in found]
+        sigmas = [(value.value - true) / value.error for value in measured]
         assert abs(np.mean(sigmas)) < 2.0
         assert np.mean(np.abs(sigmas) < 3.0) >= 5 / 6
 

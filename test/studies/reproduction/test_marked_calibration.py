@@ -76,8 +76,8 @@ def test_the_closed_form_is_applied_to_the_calibrated_decay():
     expected = paper_restitution_of_decay(
         1.0 / (START * HAFF_TIME), TRAY.diameter, TRAY.number_density
     )
-    found = calibrated_restitution(cycle, TRAY, marked_fit(cycle, TRAY))
-    assert found == pytest.approx(expected, abs=0.003)
+    restitution = calibrated_restitution(cycle, TRAY, marked_fit(cycle, TRAY))
+    assert restitution == pytest.approx(expected, abs=0.003)
     constant = cycle_with(lambda true_speed: np.full_like(true_speed, 2e-3))
     assert np.isnan(calibrated_restitution(constant, TRAY, marked_fit(cycle, TRAY)))
 

@@ -96,13 +96,13 @@ def processing_chapter(context: Context) -> Chapter:
     for tray in PAPER_TRACKED:
         paper = f'{PAPER_TRACKED[tray][0]:.0f} ± {PAPER_TRACKED[tray][1]:.0f}'
         shares = [cycle.summary['tracked'].get(str(tray), _UNTRACKED) for cycle in context.cycles]
-        detected, found, spurious = (
+        detected, matched, spurious = (
             _mean_and_deviation([share[k] for share in shares]) for k in range(len(_UNTRACKED))
         )
-        rows.append((str(tray), paper, detected, found, spurious))
+        rows.append((str(tray), paper, detected, matched, spurious))
         if tray in (1, 4):
             quantity = f'beads tracked, tray {tray} [%]'
-            differences.append(Difference(quantity, paper, '', found, '100'))
+            differences.append(Difference(quantity, paper, '', matched, '100'))
     section.parts += [
         Table(
             head=('tray', 'the paper [%]', 'detections here [%]', 'beads found [%]',

@@ -122,8 +122,8 @@ def test_a_bead_beside_another_is_not_displaced_by_it(gap):
     picture = draw(shape, centres, np.full(14, radius), np.zeros(14, int), optics)
     detector = BeadDetector(TrackingSettings(), load_trays()[1], 13500.0)
     for frame in film([picture] * 6, optics):
-        found = detector.detect(frame)[0].positions
-    rows, columns = match_positions(centres, found, 3.0)
+        places = detector.detect(frame)[0].positions
+    rows, columns = match_positions(centres, places, 3.0)
     assert rows.size == 14
-    away = (found[columns] - centres[rows]) * np.concatenate([-apart, apart])[rows]
+    away = (places[columns] - centres[rows]) * np.concatenate([-apart, apart])[rows]
     assert abs(np.mean(away.sum(axis=1)) / np.hypot(*apart[0])) < 0.03
