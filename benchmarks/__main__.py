@@ -26,6 +26,7 @@ ALL = (
     'tracking',
     'plate_cost',
     'recorder',
+    'signals',
     'foreign_world',
     'ranks',
     'radii',

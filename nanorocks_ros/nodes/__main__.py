@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from nanorocks_ros.nodes.run import NODES, run
+from nanorocks_ros.nodes.run import NODES, main
 
 if __name__ == '__main__':
     if len(sys.argv) < 2 or sys.argv[1] not in NODES:
         sys.exit(f'usage: python -m nanorocks_ros.nodes {{{",".join(NODES)}}}')
-    sys.exit(run(sys.argv.pop(1)))
+    main(sys.argv.pop(1))

@@ -6,8 +6,10 @@ import logging
 import os
 import signal
 import sys
+import time
+from contextlib import suppress
 from importlib import import_module, resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,13 +33,16 @@ NODES = (
 
 _PROFILES_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _SPIN_S = 0.2
+# A node that has not ended by then hangs: the next signal ends it, [s].
+_PATIENCE_S = 8.0
 
 
 class _Interrupts:
     """Notes Ctrl-C and SIGTERM instead of raising an exception in the middle of some code.
 
-    Such an exception gets lost in a destructor, or leaves a context half shut down. The second
-    Ctrl-C ends the process immediately.
+    Such an exception gets lost in a destructor, or leaves a context half shut down. While the node
+    ends, and writes the last messages and the index of its recording, further signals are ignored:
+    `ros2 launch` sends SIGTERM 5 s after SIGINT, and people press Ctrl-C twice.
 
     Attributes
     ----------
@@ -51,15 +56,37 @@ class _Interrupts:
     def __init__(self) -> None:
         self.requested = False
         self.exit_immediately = False
+        self._first_at = 0.0
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._handle)
 
     def _handle(self, number: int, _: object) -> None:
-        if self.requested:
-            os._exit(128 + number)
         if self.exit_immediately:
             os._exit(0)
-        self.requested = True
+        now = time.monotonic()
+        if not self.requested:
+            self.requested, self._first_at = True, now
+        elif now - self._first_at > _PATIENCE_S:
+            os._exit(128 + number)
+
+
+def main(name: str) -> NoReturn:
+    """Run a node, and end the process with its exit code.
+
+    Nothing is left to do then. The teardown of the interpreter takes seconds on a busy machine,
+    and in it a second signal would kill the process.
+
+    Parameters
+    ----------
+    name : str
+        One of `NODES`.
+    """
+    code = run(name)
+    logging.shutdown()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 def run(name: str) -> int:
@@ -139,12 +166,17 @@ def _spin(name: str, interrupts: _Interrupts) -> int:
     try:
         node.check_parameters()
         interrupts.exit_immediately = False
+        node.start_recording()
         while not node.done and not interrupts.requested:
             executor.spin_once(timeout_sec=_SPIN_S)
         return node.exit_code
     finally:
-        executor.shutdown()
-        node.destroy_node()
+        try:
+            # First, whatever happens to the rest.
+            node.end_recording()
+        finally:
+            executor.shutdown()
+            node.destroy_node()
 
 
 def _executor_for(node: NanorocksNode) -> Executor:

@@ -121,6 +121,12 @@ class NanorocksNode(Node):
         }
         self.parameters.refuse_overrides_of_unknown_topics({*names, '/clock'})
 
+    def start_recording(self) -> None:
+        """Open the recording of a node that makes one; from then on it has to be closed."""
+
+    def end_recording(self) -> None:
+        """Close the recording of a node that makes one, also twice."""
+
     def finish(self) -> None:
         """End the node once the subscriptions have what it published last."""
         self.outputs.wait_until_acknowledged()

@@ -87,6 +87,29 @@ def test_after_a_kill_all_results_older_than_two_seconds_are_readable(graph, tmp
     assert abs(bag.topics[CAMERA].count - 30 * seconds) <= 3
 
 
+@pytest.mark.parametrize(
+    'signals', [(signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGINT)]
+)
+def test_two_signals_end_the_pipeline_with_a_complete_recording(graph, tmp_path, signals):
+    """As `ros2 launch` and a second Ctrl-C send them."""
+    heard = []
+    graph.node.create_subscription(
+        Float32MultiArray, topics.TRUTH.of(1), heard.append, qos_of(topics.TRUTH)
+    )
+    path = tmp_path / 'bag'
+    process = graph.start('pipeline', *SMALL, f'record:={path}')
+    graph.until(lambda: len(heard) >= 30)
+    for number in signals:
+        process.send_signal(number)
+        time.sleep(0.05)
+    finished = graph.wait(process)
+    assert finished.code == 0, finished.output
+    bag = open_bag(path)
+    assert bag.complete
+    assert not bag.notices
+    assert bag.topics[CAMERA].count >= 30
+
+
 def test_a_player_without_pace_loses_nothing_on_its_way_into_a_recording(graph, tmp_path):
     """Frames are kept as they came, and the same ones make the same numbers."""
     path = tmp_path / 'bag'
