@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.nodes.trays.tray_stage_node import TrayStageNode
+from nanorocks_ros.pipeline.changed_settings import Part
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters
 from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
@@ -33,7 +34,7 @@ class ClusterAutocorrelatorNode(TrayStageNode):
 
     def __init__(self) -> None:
         warm_up_clusters()
-        super().__init__('cluster_autocorrelator', ClusterEstimator, _OUTPUTS)
+        super().__init__('cluster_autocorrelator', ClusterEstimator, _OUTPUTS, part=Part.CLUSTERS)
         for tray in self._settings.trays:
             for topic, record_type in _FROM_TRACKS:
                 # Without a speed estimator the autocorrelation alone gives the clusters.

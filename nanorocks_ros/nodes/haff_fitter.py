@@ -6,6 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.base.parameters import CYCLE_GOES_ON
+from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
 from nanorocks_ros.records import FreeFlight, Merge, PairCollision, Rebound, SpeedEstimate
@@ -36,8 +38,9 @@ class HaffFitterNode(NanorocksNode):
     def __init__(self) -> None:
         super().__init__('haff_fitter')
         self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
-        self._adopt(self._settings, self._build(self._settings))
-        self.parameters.react_to_changes(PipelineSettings(), self._build, self._adopt)
+        self._stages = self._build(self._settings)
+        self.diagnostics.note_priors(self._settings.prior)
+        self.parameters.react_to_changes(self._settings, self._build, self._change)
         for tray in self._settings.trays:
             self.outputs.offer((topics.COR,), tray)
         # Meanwhile others discover the publishers.
@@ -54,9 +57,14 @@ class HaffFitterNode(NanorocksNode):
             for number, tray in trays_of(settings).items()
         }
 
-    def _adopt(self, settings: PipelineSettings, stages: dict[int, RestitutionEstimator]) -> None:
-        self._settings, self._stages = settings, stages
-        self.diagnostics.note_priors(settings.prior)
+    def _change(
+        self, before: PipelineSettings, after: PipelineSettings, _: dict[int, RestitutionEstimator]
+    ) -> str:
+        if Part.RESTITUTION in changed_parts(before, after):
+            for stage in self._stages.values():
+                stage.adopt(after)
+            self.diagnostics.note_priors(after.prior)
+        return CYCLE_GOES_ON
 
     def _receive(
         self, topic: Topic, record_type: type[Any], tray: int, message: Float32MultiArray

@@ -10,6 +10,7 @@ from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
 from nanorocks_ros.nodes.sources.bag_source import (
     open_bag_frames,
@@ -25,6 +26,7 @@ from nanorocks_ros.nodes.trays.track_images import TrackImages
 from nanorocks_ros.nodes.workers.background_worker import BackgroundWorker
 from nanorocks_ros.nodes.workers.graph_recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes.workers.live_page_process import LivePageProcess
+from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.pipeline.parallel_pipeline import SharedPipeline, started, worker_count
 from nanorocks_ros.pipeline.warm_up import (
@@ -85,7 +87,7 @@ class PipelineNode(NanorocksNode):
         self._simulation = declare(st.SimulationSettings(), prefix='simulation.')
         self._pacing = declare(st.PacingSettings())
         camera = declare(st.CameraSettings())
-        record = declare(st.RecordSettings())
+        self._record_settings = declare(st.RecordSettings())
         page = declare(st.DashboardSettings(), prefix='dashboard_')
         with_page = declare(st.LivePageSettings()).dashboard
         workers = declare(st.WorkSettings()).workers
@@ -96,9 +98,6 @@ class PipelineNode(NanorocksNode):
         self._start_stages(workers)
         self._bag: BagFrames | None = None
         self._start_source(camera)
-        # Last, so that no bag is left behind when the rest cannot start.
-        if record.record:
-            self._start_recording(record)
 
     def _start_stages(self, workers: int) -> None:
         """Offer all topics, start the workers, and build the stages."""
@@ -120,7 +119,7 @@ class PipelineNode(NanorocksNode):
         for worker in self._workers:
             worker.ready()
         self._adopt(self._settings, self._build(self._settings))
-        self.parameters.react_to_changes(self._defaults, self._build, self._adopt)
+        self.parameters.react_to_changes(self._settings, self._build, self._change)
 
     def _offer_topics(self) -> None:
         self.outputs.offer((topics.EPOCH,))
@@ -138,8 +137,20 @@ class PipelineNode(NanorocksNode):
             return SharedPipeline(settings, self._camera_name, self._view, self._workers)
         return Pipeline(settings, self._camera_name, self._view)
 
-    def _adopt(self, settings: st.PipelineSettings, pipeline: Pipeline) -> None:
+    def _change(
+        self, before: st.PipelineSettings, after: st.PipelineSettings, pipeline: Pipeline
+    ) -> str:
         self._background.drain()
+        parts = changed_parts(before, after)
+        if parts & (Part.IMAGES | Part.MEASUREMENT):
+            self._adopt(after, pipeline)
+            return ALL_RESET
+        self._settings = after
+        self._pipeline.adopt(after, parts)
+        self.diagnostics.note_priors(after.prior)
+        return CYCLE_GOES_ON
+
+    def _adopt(self, settings: st.PipelineSettings, pipeline: Pipeline) -> None:
         self._settings, self._pipeline = settings, pipeline
         self.diagnostics.note_priors(settings.prior)
         pipeline.prepare()
@@ -223,7 +234,10 @@ class PipelineNode(NanorocksNode):
         self._record(frame, message)
         publish_frame(self, frame)
 
-    def _start_recording(self, record: st.RecordSettings) -> None:
+    def start_recording(self) -> None:
+        """Record from now on; last, so that no bag is left behind when the rest cannot start."""
+        if not self._record_settings.record:
+            return
         of_source: dict[str, tuple[Any, ...]] = {
             'simulator': (self._simulation,),
             'bag': (self._bag_settings,),
@@ -231,7 +245,7 @@ class PipelineNode(NanorocksNode):
         }
         self._recorder = GraphRecorder(
             self,
-            record,
+            self._record_settings,
             provenance(self._source, self._settings, *of_source[self._source]),
             self._settings.trays,
             wait_for_disk=self._as_fast_as_possible,
@@ -239,6 +253,11 @@ class PipelineNode(NanorocksNode):
         self.outputs.recorder = self._recorder
         if self._bag is not None and (camera_info := self._bag.lens_message()) is not None:
             self._recorder.record_camera_info(camera_info)
+
+    def end_recording(self) -> None:
+        """Write what waits, and the index."""
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _record(self, frame: Frame, message: object) -> None:
         if self._recorder is not None:
@@ -289,8 +308,7 @@ class PipelineNode(NanorocksNode):
         self._background.drain()
         # Images that were held back may be among the last results.
         self._publish(_Done(self._pipeline.flush(), True))
-        if self._recorder is not None:
-            self._recorder.close()
+        self.end_recording()
         self.finish()
 
     def destroy_node(self) -> None:
@@ -299,8 +317,6 @@ class PipelineNode(NanorocksNode):
         for worker in self._workers:
             worker.close()
         self._background.close()
-        if self._recorder is not None:
-            self._recorder.close()
         if self._page is not None:
             self._page.close()
         super().destroy_node()

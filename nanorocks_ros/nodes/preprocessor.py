@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.sources.camera_subscription import CameraSubscription
+from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up
 from nanorocks_ros.settings import CameraSettings, PipelineSettings
@@ -31,8 +33,8 @@ class PreprocessorNode(NanorocksNode):
         camera = self.parameters.declare(CameraSettings())
         self._camera = CameraSubscription(self, camera, self._receive, on_view)
         self._epoch = Epoch(self, may_set=True)
-        self._adopt(self._settings, self._build(self._settings))
-        self.parameters.react_to_changes(PipelineSettings(), self._build, self._adopt)
+        self._stage = self._build(self._settings)
+        self.parameters.react_to_changes(self._settings, self._build, self._change)
 
     def _build(self, settings: PipelineSettings) -> Preprocessor:
         camera = self._camera
@@ -41,8 +43,14 @@ class PreprocessorNode(NanorocksNode):
     def _rebuild(self) -> None:
         self._stage = self._build(self._settings)
 
-    def _adopt(self, settings: PipelineSettings, stage: Preprocessor) -> None:
-        self._settings, self._stage = settings, stage
+    def _change(
+        self, before: PipelineSettings, after: PipelineSettings, stage: Preprocessor
+    ) -> str:
+        self._settings = after
+        if Part.IMAGES not in changed_parts(before, after):
+            return CYCLE_GOES_ON
+        self._stage = stage
+        return ALL_RESET
 
     def _receive(self, frame: Frame) -> None:
         self._epoch.when_known(frame.stamp_ns, self._push, frame)

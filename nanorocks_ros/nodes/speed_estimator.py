@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from nanorocks_ros.nodes.trays.tray_stage_node import TrayStageNode
+from nanorocks_ros.pipeline.changed_settings import Part
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.wire import topics
 
@@ -17,6 +18,7 @@ _OUTPUTS = (
     topics.TRACKS,
     topics.REBOUND,
     topics.COLLISION,
+    topics.FLIGHT,
     topics.BODIES,
     topics.MERGE,
 )
@@ -26,7 +28,9 @@ class SpeedEstimatorNode(TrayStageNode):
     """Measures the mean projected speed of each tray, and finds rebounds and collisions."""
 
     def __init__(self) -> None:
-        super().__init__('speed_estimator', TrayMeasurement, _OUTPUTS, in_color=True)
+        super().__init__(
+            'speed_estimator', TrayMeasurement, _OUTPUTS, part=Part.MEASUREMENT, in_color=True
+        )
 
     def select_images(self, stage: Any, tray: int) -> None:
         """Masks and images of tracks are made only while somebody subscribes."""

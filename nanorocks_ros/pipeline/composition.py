@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.pipeline.changed_settings import Part
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement, TrayRecord
 from nanorocks_ros.records import (
     ArrayRecord,
@@ -73,9 +74,24 @@ class TrayStages:
     """
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        self._tray = tray
         self.measurement = TrayMeasurement(settings, tray)
         self.restitution = RestitutionEstimator(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
+
+    def adopt(self, settings: PipelineSettings, parts: Part) -> None:
+        """Take other settings of clusters and restitution; the measurement goes on.
+
+        Parameters
+        ----------
+        settings : PipelineSettings
+        parts : Part
+            That the change concerns.
+        """
+        if Part.RESTITUTION in parts:
+            self.restitution.adopt(settings)
+        if Part.CLUSTERS in parts:
+            self.clusters = ClusterEstimator(settings, self._tray)
 
     def emit(self, wanted: Wanted) -> None:
         """Choose the pictures to make from now on."""
@@ -138,6 +154,11 @@ class Pipeline:
 
     def prepare(self) -> None:
         """Prepare for the first frame, so that it need not wait."""
+
+    def adopt(self, settings: PipelineSettings, parts: Part) -> None:
+        """See `TrayStages.adopt`; for changes of other parts make a new pipeline."""
+        for tray in self.trays.values():
+            tray.adopt(calibrated(settings), parts)
 
     def push(self, frame: Frame) -> tuple[Result, ...]:
         """Everything that follows from the next frame, tray images first.

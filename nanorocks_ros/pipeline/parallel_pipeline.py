@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.experiment.view import View
+    from nanorocks_ros.pipeline.changed_settings import Part
     from nanorocks_ros.pipeline.composition import Result, Wanted
     from nanorocks_ros.pipeline.tray_processes import TrayRecords
     from nanorocks_ros.records import Notice
@@ -91,6 +92,15 @@ class SharedPipeline(Pipeline):
         if not self._prepared:
             self._run((), None)
 
+    def adopt(self, settings: PipelineSettings, parts: Part) -> None:
+        """See `Pipeline.adopt`."""
+        super().adopt(settings, parts)
+        self._settings = calibrated(settings)
+        if self._prepared:
+            for worker in self._workers:
+                worker.send(change=(self._settings, parts))
+            self._answers()
+
     def follow(
         self, records: Sequence[TrayImage | Notice], wanted: Mapping[int, Wanted] | None = None
     ) -> tuple[Result, ...]:
@@ -129,7 +139,6 @@ class SharedPipeline(Pipeline):
         flush: bool = False,
     ) -> TrayRecords:
         first, self._prepared = not self._prepared, True
-        asked = []
         for worker, share in zip(self._workers, self._shares, strict=True):
             numbers = {tray.number for tray in share}
             worker.send(
@@ -138,11 +147,14 @@ class SharedPipeline(Pipeline):
                 stages=(self._settings, share) if first else None,
                 flush=flush,
             )
-            asked.append(worker)
+        return self._answers()
+
+    def _answers(self) -> TrayRecords:
+        """The records of all processes."""
         records: TrayRecords = {}
         # All answers are received, also after an error: a worker must be free for the next job.
         errors = []
-        for worker in asked:
+        for worker in self._workers:
             try:
                 records |= worker.answer()
             except Exception as error:

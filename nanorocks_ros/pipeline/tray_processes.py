@@ -21,6 +21,7 @@ import numpy as np
 
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.trays import Tray
+from nanorocks_ros.pipeline.changed_settings import Part
 from nanorocks_ros.pipeline.composition import Result, TrayStages, Wanted
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling, warm_up_speed
 from nanorocks_ros.records import TrayImage
@@ -61,6 +62,7 @@ class _Job(NamedTuple):
     """A job for one process; see `TrayProcess.send`."""
 
     stages: StageInputs | None
+    change: tuple[PipelineSettings, Part] | None
     images: tuple[_SentImage, ...]
     wanted: Mapping[int, Wanted]
     flush: bool
@@ -110,6 +112,7 @@ class TrayProcess:
         wanted: Mapping[int, Wanted] | None = None,
         *,
         stages: StageInputs | None = None,
+        change: tuple[PipelineSettings, Part] | None = None,
         flush: bool = False,
     ) -> None:
         """Send a job; `answer` must be called before the next one.
@@ -122,6 +125,8 @@ class TrayProcess:
             By number of the tray.
         stages : (PipelineSettings, tuple of Tray), optional
             Make new stages first.
+        change : (PipelineSettings, Part), optional
+            See `TrayStages.adopt`.
         flush : bool
             Answer with the records that are held back.
 
@@ -130,7 +135,7 @@ class TrayProcess:
         NanorocksError
             When the process ended.
         """
-        job = _Job(stages, tuple(self._packed(images)), wanted or {}, flush)
+        job = _Job(stages, change, tuple(self._packed(images)), wanted or {}, flush)
         try:
             self._connection.send(job)
         except OSError as error:
@@ -254,6 +259,9 @@ class _Worker:
         if job.stages is not None:
             settings, trays = job.stages
             self._trays = {tray.number: TrayStages(settings, tray) for tray in trays}
+        if job.change is not None:
+            for tray_stages in self._trays.values():
+                tray_stages.adopt(*job.change)
         for number, wanted in job.wanted.items():
             self._trays[number].emit(wanted)
         records: TrayRecords = {}

@@ -125,7 +125,8 @@ def _as_list(value: Any) -> list[Any]:
     return list(value) if hasattr(value, '__iter__') else [value]
 
 
-def _coerced(row: SettingRow, value: Any) -> Value:
+def coerced(row: SettingRow, value: Any) -> Value:
+    """A value without a `problem` in the type of the setting: 15 as 15.0, a list as a tuple."""
     if isinstance(row.default, tuple):
         return tuple(int(item) if row.bounds.whole else float(item) for item in _as_list(value))
     kind = type(row.default)
@@ -210,7 +211,7 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
             where, '; '.join(problems), 'see docs/reference/parameters.md for names and ranges'
         )
     changed: SettingsType = _replaced(
-        settings, {name: _coerced(known[name], value) for name, value in values.items()}
+        settings, {name: coerced(known[name], value) for name, value in values.items()}
     )
     return changed
 

@@ -10,7 +10,8 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import ParameterException, ParameterUninitializedException
+from rclpy.parameter import Parameter
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 from nanorocks_ros.nodes.base.parameter_checks import (
@@ -22,13 +23,12 @@ from nanorocks_ros.nodes.base.qos_overrides import (
     refuse_invalid_overrides,
     refuse_overrides_of_unknown_topics,
 )
-from nanorocks_ros.settings import rows, with_current_names, with_values
+from nanorocks_ros.settings import coerced, problem, rows, with_current_names, with_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from rclpy.node import Node
-    from rclpy.parameter import Parameter
 
     from nanorocks_ros.settings import SettingRow
 
@@ -36,6 +36,10 @@ SettingsType = TypeVar('SettingsType')
 StagesType = TypeVar('StagesType')
 
 _NEVER_CHANGED = {'trays', 'trays_file'}
+CYCLE_GOES_ON = 'the running cycle goes on'
+"""What `adopt` of `NodeParameters.react_to_changes` returns where no stage was reset."""
+ALL_RESET = 'all stages were reset, the next shaking event starts a cycle'
+"""What it returns where all were."""
 
 
 class NodeParameters:
@@ -55,6 +59,7 @@ class NodeParameters:
         self._node = node
         self._rows: dict[str, SettingRow] = {}
         refuse_invalid_overrides(node._parameter_overrides)
+        node.add_pre_set_parameters_callback(self._with_own_types)
 
     def declare(
         self, settings: SettingsType, prefix: str = '', *, read_only: bool = True
@@ -96,23 +101,46 @@ class NodeParameters:
         return checked
 
     def _declare_row(self, name: str, row: SettingRow, *, read_only: bool) -> Any:
-        """Declare one setting; its value."""
-        default = list(row.default) if isinstance(row.default, tuple) else row.default
+        """Declare one setting with a type that never changes; its value."""
+        given = self._node._parameter_overrides
+        value = list(row.default) if isinstance(row.default, tuple) else row.default
+        if name in given:
+            value = _converted(given[name].value, row)
+        if isinstance(row.default, str) and not row.bounds.choices:
+            require_string(name, value)
+        kind = _type_of(row)
+        if not kind.check(value):
+            return value
         descriptor = _descriptor(row, read_only=read_only or row.name in _NEVER_CHANGED)
         try:
-            # rclpy cannot tell the type of an empty list: such a parameter is not set by default.
-            parameter = self._node.declare_parameter(
-                name, None if default == [] else default, descriptor
+            # rclpy cannot tell the type of an empty list: it is declared without a value.
+            self._node.declare_parameter(
+                name, kind if value == [] else value, descriptor, ignore_override=True
             )
         except ParameterException as error:
             reason = str(error).split('Reason: ')[-1]
             raise ConfigurationError(
                 f'parameter {name}', reason, 'see docs/reference/parameters.md'
             ) from error
-        value = default if parameter.value is None else parameter.value
-        if isinstance(row.default, str) and not row.bounds.choices:
-            require_string(name, value)
         return value
+
+    def _with_own_types(self, parameters: list[Parameter]) -> list[Parameter]:
+        """The parameters to set in the types that were declared, where their values allow it."""
+        return [self._with_own_type(parameter) for parameter in parameters]
+
+    def _with_own_type(self, parameter: Parameter) -> Parameter:
+        row = self._rows.get(parameter.name)
+        if row is None:
+            return parameter
+        value, kind = _converted(parameter.value, row), _type_of(row)
+        return Parameter(parameter.name, kind, value) if kind.check(value) else parameter
+
+    def _value(self, name: str) -> Any:
+        """Value of a parameter; None for a list without elements that was never set."""
+        try:
+            return self._node.get_parameter(name).value
+        except ParameterUninitializedException:
+            return None
 
     def refuse_unknown(self) -> None:
         """Refuse parameters that no node reads, rather than ignore them.
@@ -156,51 +184,72 @@ class NodeParameters:
         self,
         settings: SettingsType,
         build: Callable[[SettingsType], StagesType],
-        adopt: Callable[[SettingsType, StagesType], None],
+        adopt: Callable[[SettingsType, SettingsType, StagesType], str],
     ) -> None:
         """Build new stages for every later change; keep the old ones when that fails.
+
+        Values that are set again are no change.
 
         Parameters
         ----------
         settings : dataclass of settings
-            As declared.
+            That the node has now.
         build : callable
             Makes the stages from settings; raises NanorocksError when it cannot.
         adopt : callable
-            Takes the settings and the stages that `build` made of them.
+            Takes the settings before and after, and the stages that `build` made of these; it
+            returns what became of the running cycle, for the log.
         """
         proposal: list[tuple[SettingsType, StagesType]] = []
+        current = [settings]
 
         def check(parameters: list[Parameter]) -> SetParametersResult:
             ours = [parameter for parameter in parameters if parameter.name in self._rows]
             try:
-                values = {
-                    row.name: self._node.get_parameter(row.name).value for row in rows(settings)
-                }
+                values = {row.name: self._value(row.name) for row in rows(settings)}
                 values.update({parameter.name: parameter.value for parameter in ours})
                 given = {name: value for name, value in values.items() if value is not None}
                 changed = with_values(settings, given, 'parameters')
-                proposal[:] = [(changed, build(changed))]
+                # Loading a dump sets every parameter, most of them to the value they have.
+                proposal[:] = [] if changed == current[0] else [(changed, build(changed))]
             except NanorocksError as error:
                 return SetParametersResult(successful=False, reason=str(error))
             return SetParametersResult(successful=True)
 
         def apply(parameters: list[Parameter]) -> None:
             # A new publisher declares its quality of service as parameters: not a setting.
-            if any(parameter.name in self._rows for parameter in parameters):
-                adopt(*proposal[0])
-                self._node.get_logger().info('parameters changed; all stages were reset')
+            names = [parameter.name for parameter in parameters if parameter.name in self._rows]
+            if not names or not proposal:
+                return
+            changed, stages = proposal.pop()
+            before, current[0] = current[0], changed
+            consequence = adopt(before, changed, stages)
+            self._node.get_logger().info(f'{", ".join(names)} changed; {consequence}')
 
         self._node.add_on_set_parameters_callback(check)
         self._node.add_post_set_parameters_callback(apply)
 
 
+def _type_of(row: SettingRow) -> Parameter.Type:
+    """The type of the parameter of a setting."""
+    if isinstance(row.default, tuple):
+        return Parameter.Type.INTEGER_ARRAY if row.bounds.whole else Parameter.Type.DOUBLE_ARRAY
+    kind: Parameter.Type = Parameter.Type.from_parameter_value(row.default)
+    return kind
+
+
+def _converted(value: Any, row: SettingRow) -> Any:
+    """A value as the parameter holds it: 13500 in a YAML file has to do for 13500.0."""
+    if value is None or problem(row, value) is not None:
+        return value
+    own = coerced(row, value)
+    return list(own) if isinstance(own, tuple) else own
+
+
 def _descriptor(row: SettingRow, *, read_only: bool) -> ParameterDescriptor:
-    # The default gives the type, but 13500 in a YAML file has to do for 13500.0.
     descriptor = ParameterDescriptor(
         description=f'{row.doc} [{row.unit}]' if row.unit else row.doc,
         additional_constraints=', '.join(row.bounds.choices),
-        dynamic_typing=True,
         read_only=read_only,
     )
     low, high = row.bounds.low, row.bounds.high

@@ -11,10 +11,12 @@ from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
 from nanorocks_ros.nodes.base.node import NanorocksNode
+from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.trays.image_size_check import ImageSizeCheck
 from nanorocks_ros.nodes.trays.track_images import TrackImages
 from nanorocks_ros.nodes.trays.tray_image_messages import color_frame, gray_frame
 from nanorocks_ros.nodes.trays.tray_image_sync import TrayImageSync
+from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_counting, warm_up_speed
 from nanorocks_ros.records import Tracks, TrayImage, TrayState
@@ -43,6 +45,8 @@ class TrayStageNode(NanorocksNode):
         Makes the stage from PipelineSettings and a Tray.
     outputs : sequence of Topic
         What the node publishes, offered at once: a late offer would lose the first messages.
+    part : Part
+        That the stage is of.
     in_color : bool
         Whether the stage uses colours.
     """
@@ -53,9 +57,11 @@ class TrayStageNode(NanorocksNode):
         make_stage: Callable[[PipelineSettings, Tray], Any],
         outputs: Sequence[Topic],
         *,
+        part: Part,
         in_color: bool = False,
     ) -> None:
         super().__init__(name)
+        self._part = part
         self._in_color = in_color
         self._make_stage = make_stage
         self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
@@ -64,7 +70,7 @@ class TrayStageNode(NanorocksNode):
         if in_color:
             warm_up_speed()
         self._adopt(self._settings, self._build(self._settings))
-        self.parameters.react_to_changes(PipelineSettings(), self._build, self._adopt)
+        self.parameters.react_to_changes(self._settings, self._build, self._change)
         self._pushed_ns = dict.fromkeys(self._settings.trays, 0)
         self._sync = {tray: TrayImageSync() for tray in self._settings.trays}
         self._subscribe(outputs)
@@ -91,6 +97,15 @@ class TrayStageNode(NanorocksNode):
         return {
             number: self._make_stage(settings, tray) for number, tray in trays_of(settings).items()
         }
+
+    def _change(
+        self, before: PipelineSettings, after: PipelineSettings, stages: dict[int, Any]
+    ) -> str:
+        if not changed_parts(before, after) & (Part.IMAGES | self._part):
+            self._settings = after
+            return CYCLE_GOES_ON
+        self._adopt(after, stages)
+        return ALL_RESET
 
     def _adopt(self, settings: PipelineSettings, stages: dict[int, Any]) -> None:
         self._settings, self._stages = settings, stages

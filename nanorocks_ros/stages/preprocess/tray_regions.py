@@ -116,11 +116,12 @@ class TrayRegions:
                 'give x, y, width, height for each tray, or layout: plate; only a single tray '
                 'can be centred',
             )
-        if len(self._settings.gray_mix) != 3 or sum(self._settings.gray_mix) > 1.0 + 1e-9:
+        mix = self._settings.gray_mix
+        if len(mix) != 3 or not 0.0 < sum(mix) <= 1.0 + 1e-9:
             raise ConfigurationError(
                 'preprocess.gray_mix',
-                f'{self._settings.gray_mix}',
-                'give three weights (blue, green, red) whose sum is at most 1',
+                f'{mix}',
+                'give three weights (blue, green, red) whose sum is above 0 and at most 1',
             )
 
     def _check_lens(self, shape: tuple[int, ...]) -> None:

@@ -36,6 +36,8 @@ from nanorocks_ros.stages.restitution.species_decays import species_decays
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
     from nanorocks_ros.settings import PipelineSettings
@@ -70,13 +72,34 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
     clock = SpeedEstimate
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
-        self._settings = settings.cooling
         self._tray = tray
-        method = DecayLibraryMethod if self._settings.relation == 'library' else PaperMethod
-        self._make_method = partial(method, settings, tray)
+        self._take(settings)
         self._grains = any(species.properties.shape == 'grain' for species in tray.species)
         self._contacts = CycleContacts(self._settings)
         self.reset()
+
+    def _take(self, settings: PipelineSettings) -> None:
+        self._settings = settings.cooling
+        method = DecayLibraryMethod if self._settings.relation == 'library' else PaperMethod
+        self._make_method: Callable[[], RestitutionMethod] = partial(method, settings, self._tray)
+
+    def adopt(self, settings: PipelineSettings) -> None:
+        """Estimate with other settings from now on, with all that is known of the running cycle.
+
+        The mean of earlier cycles, which were estimated with the settings before, starts afresh.
+
+        Parameters
+        ----------
+        settings : PipelineSettings
+            Its `cooling.rebounds` and `cooling.collisions` must be as before.
+
+        Raises
+        ------
+        ConfigurationError
+            As of the constructor.
+        """
+        self._take(settings)
+        self._method = self._make_method()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         if stamp_ns is not None:
@@ -87,7 +110,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         self._merged = False
         self._flags = Quality(0)
         self._last_update_ns: int | None = None
-        self._method: RestitutionMethod = self._make_method()
+        self._method = self._make_method()
 
     @property
     def evidence(self) -> CycleLikelihoods | None:

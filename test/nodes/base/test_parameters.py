@@ -6,7 +6,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter
 
 SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
@@ -66,8 +67,58 @@ def test_a_change_that_does_not_fit_the_other_parameters_is_rejected_and_the_nod
     process = graph.start('preprocessor')
     mix = set_parameter(graph, 'preprocessor', 'preprocess.gray_mix', [1.0, 1.0, 1.0])
     assert not mix.successful
-    assert 'whose sum is at most 1' in mix.reason
+    assert 'whose sum is above 0 and at most 1' in mix.reason
     trays = set_parameter(graph, 'preprocessor', 'trays', [1, 2])
     assert not trays.successful
     assert process.poll() is None
     assert graph.interrupt(process).code == 0
+
+
+def call(graph, node, service_type, service, **request):
+    client = graph.node.create_client(service_type, f'/nanorocks/{node}/{service}')
+    graph.until(client.service_is_ready)
+    future = client.call_async(service_type.Request(**request))
+    graph.until(future.done)
+    return future.result()
+
+
+def described(graph, node, names):
+    return call(graph, node, DescribeParameters, 'describe_parameters', names=names).descriptors
+
+
+def test_a_refused_change_leaves_value_and_type(graph):
+    process = graph.start('haff_fitter')
+    names = ['cooling.duration', 'cooling.relation', 'preprocess.regions_px']
+    before = described(graph, 'haff_fitter', names)
+    for name, value in zip(names, ('long', 3.0, ['left']), strict=True):
+        refused = set_parameter(graph, 'haff_fitter', name, value)
+        assert not refused.successful
+        assert name in refused.reason or 'Wrong parameter type' in refused.reason
+    assert described(graph, 'haff_fitter', names) == before
+    regions = set_parameter(graph, 'haff_fitter', 'preprocess.regions_px', [0, 0, 100, 100])
+    assert regions.successful, regions.reason
+    assert graph.interrupt(process).code == 0
+
+
+def test_loading_a_dump_of_all_parameters_changes_nothing(graph):
+    process = graph.start('haff_fitter')
+    listed = call(graph, 'haff_fitter', ListParameters, 'list_parameters').result.names
+    names = [name for name in listed if name.startswith(('cooling.', 'prior.', 'clusters.'))]
+    values = call(graph, 'haff_fitter', GetParameters, 'get_parameters', names=names).values
+    assert len(names) > 20
+    for name, value in zip(names, values, strict=True):
+        own = Parameter.from_parameter_msg(ParameterMessage(name=name, value=value)).value
+        assert set_parameter(graph, 'haff_fitter', name, own).successful
+    assert set_parameter(graph, 'haff_fitter', 'cooling.duration', 15).successful
+    output = graph.interrupt(process).output
+    assert output.count('changed;') == 1, output
+    assert 'cooling.duration changed; the running cycle goes on' in output
+
+
+def test_a_change_that_concerns_other_stages_does_not_reset_these(graph):
+    process = graph.start('speed_estimator')
+    assert set_parameter(graph, 'speed_estimator', 'prior.scale_error', 0.01).successful
+    assert set_parameter(graph, 'speed_estimator', 'speed.interval', 0.2).successful
+    output = graph.interrupt(process).output
+    assert 'prior.scale_error changed; the running cycle goes on' in output
+    assert 'speed.interval changed; all stages were reset' in output

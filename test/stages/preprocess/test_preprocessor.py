@@ -116,7 +116,8 @@ def test_time_that_goes_back_is_a_loop_and_that_is_said():
         ({'trays': [9]}, r'trays: 9 is outside \[1, 8\]'),
         ({'trays': [1, 2]}, 'empty, with 2 trays'),
         ({'preprocess.regions_px': [0, 0, 10]}, '3 numbers for 1 trays'),
-        ({'preprocess.gray_mix': [1.0, 1.0, 1.0]}, 'whose sum is at most 1'),
+        ({'preprocess.gray_mix': [1.0, 1.0, 1.0]}, 'whose sum is above 0 and at most 1'),
+        ({'preprocess.gray_mix': [0.0, 0.0, 0.0]}, 'whose sum is above 0 and at most 1'),
         ({'preprocess.gray_mix': [0.5, 0.5]}, 'three weights'),
     ],
 )
