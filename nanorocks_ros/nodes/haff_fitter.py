@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import CYCLE_GOES_ON
+from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
@@ -43,6 +44,7 @@ class HaffFitterNode(NanorocksNode):
         self.parameters.react_to_changes(self._settings, self._build, self._change)
         for tray in self._settings.trays:
             self.outputs.offer((topics.COR,), tray)
+            self.topic_monitor.require_single_publisher(topics.COR.of(tray), ONE_SOURCE)
         # Meanwhile others discover the publishers.
         warm_up_cooling()
         for tray in self._settings.trays:

@@ -11,7 +11,9 @@ from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
+from nanorocks_ros.nodes.base.problems import Level, Problem
 from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
+from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.sources.bag_source import (
     open_bag_frames,
     recorded_moments,
@@ -50,6 +52,8 @@ if TYPE_CHECKING:
 
 # With more frames waiting than these, images are published of one frame in ten only.
 _MAX_WAITING, _SHOWN_EVERY = 3, 10
+# From so many waiting frames on, of the 30 that may wait, the node warns.
+_MANY_WAITING = 10
 
 
 class _Job(NamedTuple):
@@ -110,6 +114,7 @@ class PipelineNode(NanorocksNode):
         self._workers = started(worker_count(workers, len(self._settings.trays)))
         self._offer_topics()
         self._background = BackgroundWorker(self, self._follow, self._publish)
+        self.diagnostics.watched.append(self._waiting_frames)
         # Meanwhile others discover the publishers.
         warm_up()
         if not self._workers:
@@ -129,6 +134,7 @@ class PipelineNode(NanorocksNode):
             self.topic_monitor.require_single_publisher(topics.RAW.name)
         for tray in self._settings.trays:
             self.outputs.offer(RESULT_TOPICS, tray)
+            self.topic_monitor.require_single_publisher(topics.SPEED.of(tray), ONE_SOURCE)
 
     # Stages
 
@@ -160,6 +166,16 @@ class PipelineNode(NanorocksNode):
         self._camera_name, self._view = camera_name, view
         self._pipeline = self._build(self._settings)
         self._pipeline.prepare()
+
+    def _waiting_frames(self) -> Problem | None:
+        waiting = self._background.waiting
+        if waiting <= _MANY_WAITING:
+            return None
+        return Problem(
+            Level.WARN,
+            f'{waiting} frames wait for the trays: this machine is too slow; follow fewer trays, '
+            'or set workers:= to the number of its cores',
+        )
 
     # Sources
 

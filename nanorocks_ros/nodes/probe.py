@@ -146,10 +146,17 @@ def _mismatches(
     pairs = []
     for publisher in publishers:
         for subscription in subscriptions:
+            differing = publisher.topic_type != subscription.topic_type
             reason = _mismatch(publisher, subscription)
             if reason is not None:
-                names = (node_name_of(publisher), node_name_of(subscription))
-                pairs.append({'publisher': names[0], 'subscription': names[1], 'reason': reason})
+                pairs.append(
+                    {
+                        'publisher': node_name_of(publisher),
+                        'subscription': node_name_of(subscription),
+                        'reason': reason,
+                        'of_types': differing,
+                    }
+                )
     return pairs
 
 

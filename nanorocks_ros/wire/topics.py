@@ -52,7 +52,12 @@ class Topic:
 
 # Best effort lost up to 149 of 150 frames of 1080p in UDP fragments, reliable none; a deep
 # queue of 6 MB images would only add delay.
-RAW = Topic(name='camera/image_raw', type=IMAGE, depth=10, doc='the camera: bgr8, rgb8 or mono8')
+RAW = Topic(
+    name='camera/image_raw',
+    type=IMAGE,
+    depth=10,
+    doc='the camera: bgr8, rgb8, mono8, or with alpha, Bayer, 4:2:2 YUV, mono16',
+)
 # Of small pictures two seconds are kept: as long as a busy machine may hold up who follows them.
 RAW_COMPRESSED = Topic(
     name='camera/image_raw/compressed', type=COMPRESSED, depth=60, doc='the camera, JPEG or PNG'

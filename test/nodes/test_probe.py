@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Float32MultiArray
+from std_msgs.msg import Float32MultiArray, String
 
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 RELIABLE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
@@ -46,14 +46,21 @@ def test_incompatible_endpoints_are_listed(graph):
     graph.node.create_publisher(Float32MultiArray, 'tray_2/cor', RELIABLE)
     graph.node.create_subscription(Float32MultiArray, 'tray_2/cor', print, BEST_EFFORT)
     graph.node.create_subscription(Float32MultiArray, 'tray_3/cor', print, RELIABLE)
+    graph.node.create_publisher(String, 'tray_4/speed', RELIABLE)
+    fitter = graph.start('haff_fitter', 'trays:=[4]')
+    graph.until(lambda: 'publishes std_msgs/msg/String' in graph.output(fitter))
     code, checks = doctor(graph, '--graph')
     assert code == 1
     deaf, fine, alone = (checks[f'/nanorocks/tray_{k}/cor'] for k in (1, 2, 3))
+    other_type = checks['/nanorocks/tray_4/speed']
     assert deaf['status'] == 'problem'
     assert 'no data: /nanorocks/listener -> /nanorocks/listener' in deaf['found']
     assert 'reliab' in deaf['found'].lower()
     assert 'qos_overrides./nanorocks/tray_1/cor.subscription' in deaf['remedy']
     assert fine['status'] == 'ok'
+    assert other_type['status'] == 'problem'
+    assert 'the types differ: std_msgs/msg/String, std_msgs' in other_type['found']
+    assert other_type['remedy'].startswith('remap the topic')
     assert alone['status'] == 'warning'
     assert 'no node -> /nanorocks/listener' in alone['found']
     assert not any('doctor' in check['found'] for check in checks.values())

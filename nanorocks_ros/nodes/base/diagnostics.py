@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import re
 import time
 from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.nodes.base.problems import Level, Losses, Problem, Refusals
 from nanorocks_ros.records import CorEstimate, Headline, SpeedEstimate, TrayImage
 from nanorocks_ros.settings import PriorSettings, priors_in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable
 
     from rclpy.node import Node
 
 _REPEAT_ERROR_S = 5.0
 _REPEAT_MISSING_S = 30.0
+# Numbers in a message: stamps and sizes differ from frame to frame.
+_NUMBER = re.compile(r'\d+')
+_LEVELS = {
+    Level.OK: DiagnosticStatus.OK,
+    Level.WARN: DiagnosticStatus.WARN,
+    Level.ERROR: DiagnosticStatus.ERROR,
+}
 
 
 class Diagnostics:
@@ -35,6 +44,8 @@ class Diagnostics:
         Further values to publish, by name.
     warning : str
         A problem that does not stop the node; empty: none.
+    watched : list of callable
+        Each gives a `Problem` that the node has now, or None.
     """
 
     def __init__(self, node: Node) -> None:
@@ -46,6 +57,12 @@ class Diagnostics:
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
         self.values: dict[str, object] = {}
         self.warning = ''
+        self._refusals, self._missing = Refusals(), Losses()
+        self.watched: list[Callable[[], Problem | None]] = [
+            self._refusals.problem,
+            self._warning,
+            self._missing_frames,
+        ]
 
     def process(self, work: Callable[[Any], object], message: Any) -> None:
         """Call `work(message)`, measure how long it takes, and refuse an unusable message."""
@@ -58,15 +75,26 @@ class Diagnostics:
         self._processing_s.append(time.perf_counter() - start)
 
     def refuse(self, error: FrameError) -> None:
-        """Count and log an unusable input; the same text at most once every 5 s."""
+        """Count and log an unusable input; alike ones at most once every 5 s."""
         self.counts['refused'] += 1
         text = str(error)
-        if self._is_due(text, _REPEAT_ERROR_S):
+        self._refusals.add(text)
+        if self._is_due(_NUMBER.sub('0', text), _REPEAT_ERROR_S):
             self._node.get_logger().error(text)
         self.values['last refusal'] = text
 
-    def report_missing_frames(self, topic: str, count: int) -> None:
-        """Log, at most once every 30 s, how many frames are missing so far."""
+    def report_missing_frames(self, topic: str, missing: int, count: int) -> None:
+        """Log, at most once every 30 s, how many frames are missing so far.
+
+        Parameters
+        ----------
+        topic : str
+        missing : int
+            Number of frames before the last one.
+        count : int
+            Number so far.
+        """
+        self._missing.add(missing)
         self.values['frames missing'] = count
         if self._is_due('frames missing', _REPEAT_MISSING_S):
             self._node.get_logger().warning(
@@ -74,6 +102,19 @@ class Diagnostics:
                 'transport, or this machine is too slow; follow fewer trays, '
                 'see docs/start/doctor.md'
             )
+
+    def _warning(self) -> Problem | None:
+        return Problem(Level.WARN, self.warning) if self.warning else None
+
+    def _missing_frames(self) -> Problem | None:
+        rate = self._missing.rate()
+        if rate == 0.0:
+            return None
+        return Problem(
+            Level.WARN,
+            f'{rate:.1f} frames/s are missing: lost in transport, or this machine is too slow; '
+            'follow fewer trays, see docs/start/doctor.md',
+        )
 
     def _is_due(self, text: str, pause_s: float) -> bool:
         """Whether a text was not logged during the pause; from now on it was."""
@@ -104,20 +145,32 @@ class Diagnostics:
         """Keep what the node assumes of restitutions, for the next reports."""
         self.values['priors'] = priors_in_words(prior)
 
-    def publish(self, missing_publishers: Sequence[str]) -> None:
+    def publish(self, of_topics: Iterable[Problem]) -> None:
         """Publish everything.
 
         Parameters
         ----------
-        missing_publishers : sequence of str
-            Topics that the node subscribes to and that nobody publishes.
+        of_topics : iterable of Problem
+            With the topics of the node.
         """
         status = DiagnosticStatus(name=self._node.get_fully_qualified_name())
-        status.level, status.message = self._summary(missing_publishers)
+        own = [problem for watched in self.watched if (problem := watched()) is not None]
+        # The most serious first, of equal ones the first.
+        problems = sorted([*own, *of_topics], key=lambda problem: -problem.level)
+        worst = problems[0] if problems else Problem(Level.OK, 'working')
+        status.level, status.message = _LEVELS[worst.level], worst.text
+        further = {
+            f'problem {number}': problem.text for number, problem in enumerate(problems[1:], 2)
+        }
         status.hardware_id = 'nanorocks'
         status.values = [
             KeyValue(key=key, value=str(value))
-            for key, value in {**self.counts, **self._timing(), **self.values}.items()
+            for key, value in {
+                **self.counts,
+                **self._timing(),
+                **self.values,
+                **further,
+            }.items()
         ]
         message = DiagnosticArray(status=[status])
         message.header.stamp = self._node.get_clock().now().to_msg()
@@ -138,13 +191,3 @@ class Diagnostics:
             'processing, mean [ms]': mean,
             'processing, longest [ms]': longest,
         }
-
-    def _summary(self, missing_publishers: Sequence[str]) -> tuple[bytes, str]:
-        """Level and text of the most serious problem."""
-        if self.counts['refused']:
-            return DiagnosticStatus.ERROR, str(self.values['last refusal'])
-        if self.warning:
-            return DiagnosticStatus.WARN, self.warning
-        if missing_publishers:
-            return DiagnosticStatus.WARN, f'no publisher on {", ".join(missing_publishers)}'
-        return DiagnosticStatus.OK, 'working'

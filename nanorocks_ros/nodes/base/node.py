@@ -102,6 +102,7 @@ class NanorocksNode(Node):
             ),
             qos_overriding_options=QOS_OVERRIDES,
         )
+        self.topic_monitor.require_type(subscription.topic_name, topic.type)
         if required:
             self.topic_monitor.require_publisher(subscription.topic_name)
         return subscription
@@ -134,5 +135,4 @@ class NanorocksNode(Node):
 
     def _report(self) -> None:
         self._publisher_events.open()
-        self.topic_monitor.check_single_publishers()
-        self.diagnostics.publish(self.topic_monitor.missing_publishers())
+        self.diagnostics.publish(self.topic_monitor.problems())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import ROSClock
 
+from nanorocks_ros.nodes.base.problems import Level, Problem
 from nanorocks_ros.nodes.base.qos_compatibility import mismatches
 from nanorocks_ros.nodes.base.ros_messages import node_name_of
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 _PATIENCE_S = 5.0
+ONE_SOURCE = 'stop all but one, or give each graph a namespace of its own (-r __ns:=/NAME)'
+"""Remedy for results that two nodes publish."""
 _ONE_CAMERA = 'stop all but one, or give each a namespace of its own (-r __ns:=/NAME)'
 # A publisher is discovered before the node that it belongs to; so many checks wait for the name.
 _UNKNOWN_NODE, _MAX_WAITS = '_NODE_NAME_UNKNOWN_', 5
@@ -42,6 +45,10 @@ class TopicMonitor:
         self._clock = clock
         self._single: dict[str, str] = {}
         self._waits: Counter[str] = Counter()
+        # Problems that were logged, while they last.
+        self._several: dict[str, str] = {}
+        self._wrong_types: dict[str, str] = {}
+        self._types: dict[str, str] = {}
         self.required: list[str] = []
         self._check_later(self._check_clock)
 
@@ -66,26 +73,70 @@ class TopicMonitor:
         """Warn when more than one node publishes a topic: their messages would be mixed."""
         self._single[name] = remedy
 
-    def missing_publishers(self) -> list[str]:
-        """The required topics that nobody publishes now."""
-        return [name for name in self.required if self._node.count_publishers(name) == 0]
+    def require_type(self, topic: str, type_name: str) -> None:
+        """Tell when a topic that the node subscribes to is published with another type.
 
-    def check_single_publishers(self) -> None:
-        """Check the topics that only one node should publish."""
-        for name, remedy in list(self._single.items()):
+        Parameters
+        ----------
+        topic : str
+            Full name.
+        type_name : str
+            Such as ``sensor_msgs/msg/Image``.
+        """
+        self._types[topic] = type_name
+
+    def problems(self) -> list[Problem]:
+        """Wrong types, several publishers, and required topics that nobody publishes, now."""
+        self._check_types()
+        self._check_single_publishers()
+        missing = [name for name in self.required if self._node.count_publishers(name) == 0]
+        return [
+            *(Problem(Level.ERROR, text) for text in self._wrong_types.values()),
+            *(Problem(Level.WARN, text) for text in self._several.values()),
+            *([Problem(Level.WARN, f'no publisher on {", ".join(missing)}')] if missing else []),
+        ]
+
+    def _check_types(self) -> None:
+        for topic, expected in self._types.items():
+            if self._node.count_publishers(topic) == 0:
+                self._wrong_types.pop(topic, None)
+                continue
+            wrong = [
+                endpoint
+                for endpoint in self._node.get_publishers_info_by_topic(topic)
+                if endpoint.topic_type != expected
+            ]
+            if not wrong:
+                self._wrong_types.pop(topic, None)
+            elif topic not in self._wrong_types:
+                published = wrong[0].topic_type
+                text = (
+                    f'{topic}: {node_name_of(wrong[0])} publishes {published}, this node takes '
+                    f'{expected}, so that nothing arrives; remap the topic (-r {topic}:=/OTHER)'
+                )
+                if 'Image' in expected and 'Image' in published:
+                    text += ', or set transport:=raw or transport:=compressed'
+                self._wrong_types[topic] = text
+                self._warn(text)
+
+    def _check_single_publishers(self) -> None:
+        for name, remedy in self._single.items():
             topic = self._node.resolve_topic_name(name)
             if self._node.count_publishers(topic) < 2:
+                self._several.pop(name, None)
+                continue
+            if name in self._several:
                 continue
             endpoints = self._node.get_publishers_info_by_topic(topic)
             unknown = any(endpoint.node_name == _UNKNOWN_NODE for endpoint in endpoints)
             if unknown and self._waits[name] < _MAX_WAITS:
                 self._waits[name] += 1
                 continue
-            del self._single[name]
             nodes = sorted(node_name_of(endpoint) for endpoint in endpoints)
-            self._warn(
+            self._several[name] = (
                 f'{topic}: published by {" and ".join(nodes)}, their messages are mixed; {remedy}'
             )
+            self._warn(self._several[name])
 
     def report_incompatible_qos(self, name: str, _: Any) -> None:
         """Warn that a publisher offers less than this node requests; the middleware calls it."""

@@ -10,6 +10,7 @@ from sensor_msgs.msg import CameraInfo
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
+from nanorocks_ros.nodes.base.problems import Silence
 from nanorocks_ros.nodes.base.ros_messages import qos_of
 from nanorocks_ros.nodes.sources.dropped_frames import DroppedFrames
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
@@ -81,7 +82,11 @@ class CameraSubscription:
         if on_view is not None:
             self._subscribe_to_camera_info()
         node.topic_monitor.require_single_publisher(topic.name)
+        self._silence = Silence(self.topic)
         self._acknowledgement = FrameAcknowledgement(node, [node.listen(topic, self._receive)])
+        node.diagnostics.watched.append(
+            lambda: self._silence.problem(node.count_publishers(self.topic))
+        )
 
     def _subscribe_to_camera_info(self) -> None:
         # Ours is latched; drivers send one with each frame and do not keep it.
@@ -116,6 +121,7 @@ class CameraSubscription:
         self._release()
 
     def _receive(self, message: Image | CompressedImage) -> None:
+        self._silence.hear()
         try:
             self._hold_or_pass_on(message)
         finally:
@@ -146,8 +152,8 @@ class CameraSubscription:
         if self._refusal is not None:
             raise self._refusal
         frame = self._read(message, self.topic)
-        if self._dropped.push(frame.stamp_ns):
-            self._node.diagnostics.report_missing_frames(self.topic, self._dropped.count)
+        if missing := self._dropped.push(frame.stamp_ns):
+            self._node.diagnostics.report_missing_frames(self.topic, missing, self._dropped.count)
         # The last frame is kept until the next one is there: otherwise its 6 MB go back to the
         # system each time, and to get them again took as long as decoding.
         self._last_frame, self.message = frame, message

@@ -75,12 +75,22 @@ class PlaybackClock:
         RuntimeError
             When the clock is paused, or there is no next moment.
         """
+        return max(self._until_next(), 0.0)
+
+    def seconds_late(self) -> float:
+        """How long the next moment has been due, [s]; 0 while paused and at the end."""
+        if self.next_ns is None or self._since is None or self._rate == 0.0:
+            return 0.0
+        return max(-self._until_next(), 0.0)
+
+    def _until_next(self) -> float:
+        """Time to the next moment, [s]; negative when it is late."""
         if self.next_ns is None or self._since is None:
             raise RuntimeError('no moment is due while the clock is paused or at the end')
         if self.next_ns < self._last_ns:
             return 0.0
         due = self._since + (self.next_ns - self._position_ns) / NS / self._rate
-        return max(due - self._clock(), 0.0)
+        return due - self._clock()
 
     def advance(self, stamp_ns: int) -> None:
         """Note the moment that is played now."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.nodes.base.problems import Level, Problem
 from nanorocks_ros.nodes.sources.flow_control import FlowControl
 from nanorocks_ros.nodes.sources.playback_clock import PlaybackClock
 from nanorocks_ros.records import NS
@@ -20,6 +21,8 @@ _MIN_PERIOD_S = 0.002
 _MAX_PERIOD_S = 0.02
 # Then other callbacks have their turn: services, timers.
 _SLICE_S = 0.005
+# A player that is later than this cannot keep up, [s]; it is logged again after, [s].
+_LATE_S, _REPEAT_LATE_S = 1.0, 30.0
 # Until discovery is complete on the side of the listeners, too: the first frames were lost
 # otherwise.
 _SETTLE_S = 1.0
@@ -69,6 +72,8 @@ class Player:
         self.paused = False
         self.flow_control = FlowControl(node)
         self.set_rate(pacing.rate)
+        self._node = node
+        node.diagnostics.watched.append(self._behind)
         self._timer = node.create_timer(_MIN_PERIOD_S, self._tick, clock=node.steady_clock)
 
     @property
@@ -115,6 +120,18 @@ class Player:
             if is_last(moment):
                 return True
         return False
+
+    def _behind(self) -> Problem | None:
+        """A warning while the moments are emitted later and later."""
+        late = self._clock.seconds_late()
+        if late < _LATE_S:
+            return None
+        text = (
+            f'{late:.0f} s behind the pace of rate:={self.rate:g}: this machine is too slow; set '
+            'a lower rate, or rate:=0.0 to play as fast as the graph follows'
+        )
+        self._node.get_logger().warning(text, throttle_duration_sec=_REPEAT_LATE_S)
+        return Problem(Level.WARN, text)
 
     def _look_ahead(self) -> None:
         self._next = next(self._moments, None)

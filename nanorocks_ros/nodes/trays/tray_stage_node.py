@@ -12,6 +12,7 @@ from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
+from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.trays.image_size_check import ImageSizeCheck
 from nanorocks_ros.nodes.trays.track_images import TrackImages
 from nanorocks_ros.nodes.trays.tray_image_messages import color_frame, gray_frame
@@ -86,6 +87,7 @@ class TrayStageNode(NanorocksNode):
         subscriptions = []
         for tray in self._settings.trays:
             self.outputs.offer(outputs, tray)
+            self.topic_monitor.require_single_publisher(outputs[0].of(tray), ONE_SOURCE)
             subscriptions += [
                 self.listen(topic, partial(receive, tray), tray, required=topic == topics.GRAY)
                 for topic, receive in inputs.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -15,7 +15,38 @@ from nanorocks_ros.records import NS, Frame
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
+
+class _Encoding(NamedTuple):
+    """How the pixels of an encoding become those of a frame."""
+
+    bytes: int
+    """Of a pixel."""
+    frame: str
+    """Encoding of the frame."""
+    conversion: int | None = None
+    """Code of cv2.cvtColor; None: the first channels are taken as they are."""
+
+
+_FRAME_CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
+_ENCODINGS = {
+    'bgr8': _Encoding(3, 'bgr8'),
+    'rgb8': _Encoding(3, 'rgb8'),
+    'mono8': _Encoding(1, 'mono8'),
+    'bgra8': _Encoding(4, 'bgr8'),
+    'rgba8': _Encoding(4, 'rgb8'),
+    '8UC3': _Encoding(3, 'bgr8'),
+    '8UC1': _Encoding(1, 'mono8'),
+    'mono16': _Encoding(2, 'mono8'),
+    # OpenCV names a pattern by its second row.
+    'bayer_rggb8': _Encoding(1, 'bgr8', cv2.COLOR_BayerBG2BGR),
+    'bayer_bggr8': _Encoding(1, 'bgr8', cv2.COLOR_BayerRG2BGR),
+    'bayer_gbrg8': _Encoding(1, 'bgr8', cv2.COLOR_BayerGR2BGR),
+    'bayer_grbg8': _Encoding(1, 'bgr8', cv2.COLOR_BayerGB2BGR),
+    'yuv422': _Encoding(2, 'bgr8', cv2.COLOR_YUV2BGR_UYVY),
+    'uyvy': _Encoding(2, 'bgr8', cv2.COLOR_YUV2BGR_UYVY),
+    'yuv422_yuy2': _Encoding(2, 'bgr8', cv2.COLOR_YUV2BGR_YUY2),
+    'yuyv': _Encoding(2, 'bgr8', cv2.COLOR_YUV2BGR_YUY2),
+}
 _READ = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 # Video codecs and the first bytes of image formats.
 _VIDEO_CODECS = frozenset({'h264', 'h265', 'hevc', 'vp9', 'av1'})
@@ -67,20 +98,23 @@ def _bytes_of(data: Any) -> NDArray[np.uint8]:
     return np.frombuffer(data, dtype=np.uint8) if len(data) else np.empty(0, dtype=np.uint8)
 
 
-def _channels(encoding: str, where: str) -> int:
-    channels = _CHANNELS.get(encoding)
-    if channels is None:
-        supported = ', '.join(_CHANNELS)
+def _known(encoding: str, where: str) -> _Encoding:
+    known = _ENCODINGS.get(encoding)
+    if known is None:
         raise FrameError(
             where,
-            f"encoding '{encoding}' is not supported ({supported})",
-            'configure the camera to publish one of these',
+            f"encoding '{encoding}' is not supported ({', '.join(_ENCODINGS)})",
+            'configure the camera to publish one of these, or convert it with a node (image_proc '
+            'debayer_node for Bayer patterns of 16 bits)',
         )
-    return channels
+    return known
 
 
 def frame_from_image(message: Any, where: str) -> Frame:
-    """Convert an image message to a frame; the pixels are a view of the message.
+    """Convert an image message to a frame; where they can be, the pixels are a view of it.
+
+    An alpha channel is left out, of 16 bits the upper 8 are kept; Bayer patterns and 4:2:2 YUV
+    are converted.
 
     Parameters
     ----------
@@ -96,14 +130,14 @@ def frame_from_image(message: Any, where: str) -> Frame:
     Raises
     ------
     FrameError
-        If the encoding is not bgr8, rgb8 or mono8, the size does not fit the data, or there is
-        no time stamp.
+        If the encoding is not supported, the size does not fit the data, or there is no time
+        stamp.
     """
     encoding = str(message.encoding)
-    channels = _channels(encoding, where)
+    known = _known(encoding, where)
     height, width, step = int(message.height), int(message.width), int(message.step)
     data = _bytes_of(message.data)
-    row = width * channels
+    row = width * known.bytes
     if height < 1 or width < 1 or step < row or data.size != height * step:
         raise FrameError(
             where,
@@ -112,8 +146,22 @@ def frame_from_image(message: Any, where: str) -> Frame:
             'check the camera driver',
         )
     rows = data.reshape(height, step)[:, :row]
-    image = rows.reshape(height, width, channels) if channels > 1 else rows
-    return Frame(stamp_ns=valid_stamp_ns(message, where), encoding=encoding, image=image)
+    pixels = rows.reshape(height, width, known.bytes)
+    image = _frame_pixels(pixels, known, upper_byte=0 if message.is_bigendian else 1)
+    return Frame(stamp_ns=valid_stamp_ns(message, where), encoding=known.frame, image=image)
+
+
+def _frame_pixels(
+    pixels: NDArray[np.uint8], known: _Encoding, *, upper_byte: int
+) -> NDArray[np.uint8]:
+    """The pixels of a frame, from those of a message: (height, width, bytes of a pixel)."""
+    if known.conversion is not None:
+        own = np.ascontiguousarray(pixels)
+        return np.asarray(cv2.cvtColor(own, known.conversion), dtype=np.uint8)
+    channels = _FRAME_CHANNELS[known.frame]
+    if channels > 1:
+        return pixels[:, :, :channels]
+    return pixels[:, :, upper_byte if known.bytes > 1 else 0]
 
 
 def frame_from_compressed(message: Any, where: str) -> Frame:

@@ -5,11 +5,13 @@ Tested by ``test/tools/doctor/test_machine_checks.py``.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.tools.doctor import machine_checks, package_checks, ros_checks, ros_probe_client
 from nanorocks_ros.tools.doctor.findings import Finding, Status
 from nanorocks_ros.wire import topics
+from nanorocks_ros.wire.products import ARRAY_TOPICS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -91,13 +93,16 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
             f'{mismatch["publisher"]} -> {mismatch["subscription"]}: {mismatch["reason"]}'
             for mismatch in topic['mismatches']
         )
-        return Finding(
-            name=name,
-            status=Status.PROBLEM,
-            found=f'no data: {pairs}',
-            remedy=f'for our nodes: -p qos_overrides.{name}.subscription.reliability:='
-            'best_effort, or .durability:=volatile; for other nodes: request the offered QoS',
+        remedy = (
+            f'for our nodes: -p qos_overrides.{name}.subscription.reliability:='
+            'best_effort, or .durability:=volatile; for other nodes: request the offered QoS'
         )
+        if any(mismatch['of_types'] for mismatch in topic['mismatches']):
+            remedy = (
+                f'remap the topic of one of them (-r {name}:=/OTHER); for a camera set '
+                'transport:=raw or transport:=compressed'
+            )
+        return Finding(name=name, status=Status.PROBLEM, found=f'no data: {pairs}', remedy=remedy)
     if not senders:
         return Finding(
             name=name,
@@ -112,7 +117,20 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
             found=f'{found}: frames of {len(senders)} cameras are mixed',
             remedy='stop one, or start it in another namespace',
         )
+    if len(senders) > 1 and _of_result(name):
+        return Finding(
+            name=name,
+            status=Status.WARNING,
+            found=f'{found}: results of {len(senders)} nodes are mixed',
+            remedy='stop all but one, or start each graph in another namespace (-r __ns:=/NAME)',
+        )
     return Finding(name=name, found=found)
+
+
+def _of_result(name: str) -> bool:
+    """Whether a topic is one of the results of a tray."""
+    general = re.sub(r'/tray_\d+/', '/tray_{tray}/', name)
+    return any(general.endswith(f'/{topic.name}') for topic in ARRAY_TOPICS.values())
 
 
 def _node_names(nodes: list[str]) -> str:

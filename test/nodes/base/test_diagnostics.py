@@ -55,6 +55,24 @@ def test_an_unusable_message_is_counted_and_shown(report):
     assert (values['received'], values['refused']) == ('2', '1')
 
 
+def test_alike_refusals_of_every_frame_are_logged_once(own_node, capfd):
+    node, _ = own_node
+    for number in range(20):
+        node.diagnostics.refuse(FrameError('camera', f'frame {number} is dark', 'light'))
+    assert capfd.readouterr().err.count('is dark') == 1
+
+
+def test_further_problems_stand_among_the_values(report):
+    node, next_status = report
+    node.topic_monitor.require_publisher('/nowhere')
+    node.diagnostics.warning = 'the disk is full'
+    node.diagnostics.process(refuse, None)
+    status, values = next_status()
+    assert status.level == DiagnosticStatus.ERROR
+    assert values['problem 2'] == 'the disk is full'
+    assert values['problem 3'] == 'no publisher on /nowhere'
+
+
 def test_a_warning_and_a_missing_publisher_are_shown_in_this_order(report):
     node, next_status = report
     node.topic_monitor.require_publisher('/nowhere')

@@ -113,7 +113,7 @@ def test_a_camera_without_camera_info_is_assumed_to_be_undistorted(graph):
 @pytest.mark.parametrize(
     ('bad', 'message'),
     [
-        ({'encoding': 'bayer_rggb8'}, "encoding 'bayer_rggb8' is not supported"),
+        ({'encoding': 'bayer_rggb16'}, "encoding 'bayer_rggb16' is not supported"),
         ({'size': 300}, 'the frame size changed from 240x240 to 300x300 px'),
     ],
 )

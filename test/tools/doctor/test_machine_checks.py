@@ -145,6 +145,21 @@ def test_two_cameras_on_one_topic_are_found():
     assert 'frames of 2 cameras are mixed' in finding.found
 
 
+def test_results_of_two_pipelines_on_one_topic_are_found():
+    topic = {
+        'name': '/lab/tray_3/speed',
+        'types': ['std_msgs/msg/Float32MultiArray'],
+        'publishers': [{'node': '/lab/pipeline'}, {'node': '/lab/speed_estimator'}],
+        'subscriptions': [{'node': '/lab/dashboard'}],
+        'mismatches': [],
+    }
+    (finding,) = examine_graph([topic])
+    assert finding.status is Status.WARNING
+    assert 'results of 2 nodes are mixed' in finding.found
+    (other,) = examine_graph([{**topic, 'name': '/lab/chatter'}])
+    assert other.status is Status.OK
+
+
 def test_an_empty_graph_names_the_variables_to_compare():
     (finding,) = examine_graph([])
     assert finding.status is Status.WARNING
