@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -79,6 +80,31 @@ def workspace(request, source_copy, tmp_path_factory):
 def test_colcon_finds_both_packages(source_copy):
     packages = colcon('list', '--names-only', '--base-paths', '.', 'msg_defs', cwd=source_copy)
     assert packages.split() == ['nanorocks_msgs', 'nanorocks_ros']
+
+
+def test_colcon_finds_both_packages_of_a_clone_in_src(source_copy, tmp_path):
+    """As the documentation says for a workspace; the shell expands the star."""
+    source = tmp_path / 'src'
+    source.mkdir()
+    (source / 'nanorocks_ros').symlink_to(source_copy)
+    below = sorted(str(path.relative_to(tmp_path)) for path in source.glob('*/msg_defs'))
+    packages = colcon('list', '--names-only', '--base-paths', 'src', *below, cwd=tmp_path)
+    assert packages.split() == ['nanorocks_msgs', 'nanorocks_ros']
+
+
+def test_both_packages_have_what_a_release_needs(source_copy):
+    """Licence file, changes and the same version, in each: they are released one by one."""
+    versions = set()
+    for folder in (source_copy, source_copy / 'msg_defs' / 'nanorocks_msgs'):
+        package = ElementTree.parse(folder / 'package.xml').getroot()
+        versions.add(package.findtext('version'))
+        licence = package.find('license')
+        assert licence is not None
+        assert (folder / licence.attrib['file']).read_text() == (ROOT / 'LICENSE').read_text()
+        name = package.findtext('name')
+        assert f'Changelog for package {name}' in (folder / 'CHANGELOG.rst').read_text()
+        assert package.findtext('author')
+    assert len(versions) == 1
 
 
 def test_ros2_run_finds_every_executable(workspace):
