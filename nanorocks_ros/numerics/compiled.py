@@ -7,15 +7,13 @@ and integers, this makes states and pictures bit-identical on every machine.
 from __future__ import annotations
 
 import logging
-import re
-import sys
 from contextlib import suppress
-from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
 from numba.core import event
+
+from nanorocks_ros.numerics.kernel_cache import share
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,9 +22,6 @@ LOGGER = logging.getLogger('nanorocks_ros')
 
 # Functions that take longest to compile, and the part of the program they belong to.
 _SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
-
-# Imports at the left margin; those for the type checker alone are indented and not compiled.
-_IMPORT = re.compile(r'^(?:from|import) ([\w.]+)', re.MULTILINE)
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
@@ -79,41 +74,10 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     except RuntimeError:
         # numba does not cache if neither the package nor the home is writable.
         return _njit(function, options)
-    # numba checks the file of the function only, but called functions and constants are compiled
-    # into it: after an update the cache would mix old and new code. The stamp becomes part of the
-    # version, which numba compares before it unpickles an index: unpickling fails when the module
-    # of an argument's type has been moved.
+    # A numba that keeps its cache in another way keeps it where it wants to.
     with suppress(AttributeError):
-        file = dispatcher._cache._cache_file
-        file._version = (file._version, _stamp(function.__module__))
+        share(dispatcher, function.__module__)
     return cast('Function', dispatcher)
-
-
-@cache
-def _stamp(module: str) -> tuple[tuple[str, int, int], ...]:
-    """Name, time and size of a module and of all modules of its package that it imports."""
-    package = module.partition('.')[0]
-    stamps: dict[str, tuple[str, int, int]] = {}
-    pending = [module]
-    while pending:
-        name = pending.pop()
-        path = getattr(sys.modules.get(name), '__file__', None)
-        if name in stamps or path is None:
-            continue
-        status = Path(path).stat()
-        stamps[name] = name, status.st_mtime_ns, status.st_size
-        pending += [
-            imported for imported in _imports(path) if imported.partition('.')[0] == package
-        ]
-    return tuple(stamps[name] for name in sorted(stamps))
-
-
-@cache
-def _imports(path: str) -> tuple[str, ...]:
-    try:
-        return tuple(_IMPORT.findall(Path(path).read_text('utf-8')))
-    except (OSError, UnicodeDecodeError):
-        return ()
 
 
 def _njit(function: Function, options: dict[str, Any]) -> Function:

@@ -37,7 +37,7 @@ print(caller(10), sum(caller.stats.cache_hits.values()))
 """
 
 
-def asked(folder, question=ASK):
+def asked(folder, question=ASK, kept=None):
     """What the caller says, and how often it was found compiled."""
     done = subprocess.run(
         [sys.executable, '-c', question],
@@ -45,7 +45,7 @@ def asked(folder, question=ASK):
         env={
             **os.environ,
             'PYTHONPATH': os.pathsep.join((str(folder), str(ROOT))),
-            'NUMBA_CACHE_DIR': str(folder / 'kept'),
+            'NUMBA_CACHE_DIR': str(kept or folder / 'kept'),
         },
         capture_output=True,
         text=True,
@@ -63,12 +63,7 @@ def changed(path, text):
 
 
 def test_a_cached_function_follows_changes_of_the_functions_and_constants_it_uses(tmp_path):
-    package = tmp_path / 'tried'
-    package.mkdir()
-    (package / '__init__.py').touch()
-    (package / 'constants.py').write_text('TERM = 1\n')
-    (package / 'callee.py').write_text(CALLEE.format(factor=2))
-    (package / 'caller.py').write_text(CALLER)
+    package = tried_package(tmp_path)
     assert asked(tmp_path) == (22, 0)
     assert asked(tmp_path) == (22, 1)
     changed(package / 'callee.py', CALLEE.format(factor=3))
@@ -77,6 +72,41 @@ def test_a_cached_function_follows_changes_of_the_functions_and_constants_it_use
     changed(package / 'constants.py', 'TERM = 5\n')
     assert asked(tmp_path) == (45, 0)
     assert asked(tmp_path) == (45, 1)
+
+
+def tried_package(folder):
+    """A package of three modules that is compiled."""
+    package = folder / 'tried'
+    package.mkdir(parents=True)
+    (package / '__init__.py').touch()
+    (package / 'constants.py').write_text('TERM = 1\n')
+    (package / 'callee.py').write_text(CALLEE.format(factor=2))
+    (package / 'caller.py').write_text(CALLER)
+    return package
+
+
+def test_installations_of_equal_code_share_what_is_compiled(tmp_path):
+    kept = tmp_path / 'kept'
+    for name, hits in (('first', 0), ('second', 1)):
+        tried_package(tmp_path / name)
+        assert asked(tmp_path / name, kept=kept) == (22, hits)
+    other = tried_package(tmp_path / 'other')
+    (other / 'constants.py').write_text('TERM = 5\n')
+    assert asked(tmp_path / 'other', kept=kept) == (30, 0)
+    # The one code has not replaced the other.
+    assert asked(tmp_path / 'first', kept=kept) == (22, 1)
+
+
+def test_folders_of_old_code_are_removed_when_new_code_comes(tmp_path):
+    kept = tmp_path / 'kept'
+    package = tried_package(tmp_path)
+    asked(tmp_path, kept=kept)
+    (old,) = kept.glob('tried.caller-*')
+    os.utime(old, (0.0, 0.0))
+    (package / 'constants.py').write_text('TERM = 5\n')
+    assert asked(tmp_path, kept=kept) == (30, 0)
+    assert not old.exists()
+    assert len(list(kept.glob('tried.caller-*'))) == 1
 
 
 PAIR = """

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import nanorocks_ros
+from nanorocks_ros.numerics.kernel_cache import cache_root
 from nanorocks_ros.tools.doctor.findings import Finding, Status
 
 _GB = 1e9
@@ -85,8 +86,9 @@ def compiled_kernels() -> Finding:
     """Whether kernels compiled by numba can be cached for the next start."""
     name = 'compiled kernels'
     package = Path(nanorocks_ros.__file__).parent
-    chosen = os.environ.get('NUMBA_CACHE_DIR')
-    places = [Path(chosen)] if chosen else [package, Path.home() / '.cache']
+    places = [cache_root()]
+    if 'NUMBA_CACHE_DIR' not in os.environ:
+        places.append(package)
     usable = [place for place in places if _writable(place)]
     if usable:
         return Finding(name=name, found=f'cached in {usable[0]}')
