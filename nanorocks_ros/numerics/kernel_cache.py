@@ -4,8 +4,6 @@ numba keeps them beside the source, so that every installation, environment and 
 a minute. Here the folder is named by what is compiled: the text of the module and of all modules
 of its package that it imports. Equal code is found again wherever it is installed; other code is
 in another folder.
-
-Tested by ``test/numerics/test_compiled.py``.
 """
 
 from __future__ import annotations
