@@ -10,7 +10,7 @@ from sensor_msgs.msg import CameraInfo
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
-from nanorocks_ros.nodes.base.problems import Silence
+from nanorocks_ros.nodes.base.problems import Level, Problem, Silence
 from nanorocks_ros.nodes.base.ros_messages import qos_of
 from nanorocks_ros.nodes.sources.dropped_frames import DroppedFrames
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
@@ -84,9 +84,10 @@ class CameraSubscription:
         node.topic_monitor.require_single_publisher(topic.name)
         self._silence = Silence(self.topic)
         self._acknowledgement = FrameAcknowledgement(node, [node.listen(topic, self._receive)])
-        node.diagnostics.watched.append(
-            lambda: self._silence.problem(node.count_publishers(self.topic))
-        )
+        node.diagnostics.watched += [
+            lambda: self._silence.problem(node.count_publishers(self.topic)),
+            self._other_camera,
+        ]
 
     def _subscribe_to_camera_info(self) -> None:
         # Ours is latched; drivers send one with each frame and do not keep it.
@@ -140,6 +141,19 @@ class CameraSubscription:
         self._started = True
         self._release()
         self._pass_on(message)
+
+    def _other_camera(self) -> Problem | None:
+        """A warning while the camera_info that is used is of another coordinate frame."""
+        if self.camera_info is None or self.message is None:
+            return None
+        lens, image = self.camera_info.header.frame_id, self.message.header.frame_id
+        if not lens or not image or lens == image:
+            return None
+        return Problem(
+            Level.WARN,
+            f'{self._info_topic}: frame_id {lens!r}, but the images of {self.topic} have '
+            f'{image!r}: is it of another camera? Remap it (-r {self._info_topic}:=/OTHER)',
+        )
 
     def _release(self) -> None:
         """Pass on the frames that were held back."""

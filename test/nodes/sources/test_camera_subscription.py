@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -40,8 +40,8 @@ class FilmedTray:
         self.picture = pixels
         self._second = 0
 
-    def send_camera_info(self, model='equidistant'):
-        message = camera_info_message(0, 'camera', CAMERA)
+    def send_camera_info(self, model='equidistant', frame_id='camera'):
+        message = camera_info_message(0, frame_id, CAMERA)
         message.distortion_model = model
         self._lens.publish(message)
 
@@ -143,4 +143,24 @@ def test_missing_frames_are_reported_and_counted(graph):
     warning = '/nanorocks/camera/image_raw: 3 frames missing so far (gaps between the time stamps)'
     graph.until(lambda: warning in graph.output(process))
     graph.until(lambda: camera.values.get('frames missing') == '3')
+    assert graph.interrupt(process).code == 0
+
+
+def test_a_silent_camera_and_the_camera_info_of_another_one_are_told(graph):
+    statuses = []
+    graph.node.create_subscription(
+        DiagnosticArray, '/diagnostics', lambda message: statuses.extend(message.status), 10
+    )
+    camera = FilmedTray(graph, latched=True)
+    camera.send_camera_info(frame_id='left')
+    process = graph.start('preprocessor')
+    camera.film_until(lambda: camera.trays)
+    camera.film_until(lambda: "frame_id 'left', but the images" in statuses[-1].message)
+    assert statuses[-1].level == DiagnosticStatus.WARN
+    # The camera stops, but its publisher is there.
+    silent = '/nanorocks/camera/image_raw: no frame for'
+    graph.until(lambda: statuses[-1].message.startswith(silent))
+    graph.until(lambda: statuses[-1].level == DiagnosticStatus.ERROR)
+    assert statuses[-1].message.startswith(silent)
+    camera.film_until(lambda: statuses[-1].level == DiagnosticStatus.WARN)
     assert graph.interrupt(process).code == 0
