@@ -193,13 +193,12 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         lines.append(f'from {source}')
         if restitution.speed_dependent:
             lines += [
-                f'exponent of 1 - restitution of {kind}: {text(name, 1.0, 2)} at '
-                f'{1e3 * speed:.2f} mm/s'
-                for kind, name, speed in (
-                    ('beads', 'restitution_exponent', restitution.impact_speed),
-                    ('walls', 'wall_restitution_exponent', restitution.wall_impact_speed),
-                )
-                if values[name] is not None
+                f'{kind}: exponent of 1 - restitution '
+                f'{text(f"{prefix}restitution_exponent", 1.0, 2)}; '
+                f'restitution {text(f"{prefix}impact_restitution", 1.0, 3)} at '
+                f'{1e3 * values[f"{prefix}impact_speed"]:.2f} mm/s'
+                for kind, prefix in (('beads', ''), ('walls', 'wall_'))
+                if values[f'{prefix}restitution_exponent'] is not None
             ]
     if tray.left_out:
         lines.append(

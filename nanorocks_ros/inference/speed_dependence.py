@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.inference.flights.flight_losses import Slowing
+from nanorocks_ros.records import Interval
 from nanorocks_ros.records.headlines import walls_rub
 
 if TYPE_CHECKING:
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 # tested, but intervals are rather too wide: at most 5 % of gases of constant restitution have a
 # smaller one in either (`python -m benchmarks speed_dependence`).
 _MAX_CHANCE = 0.05
+# Chance below which a dependence that is not certain enters the restitution of the beads, and the
+# range of exponents of which each is then as likely as that the restitution is constant: those of
+# known materials are 0 to 0.6.
+_HINT, _EXPONENTS = 0.32, 1.5
 # Of the contacts of an estimate before.
 _MORE = 1.1
 
@@ -38,6 +43,23 @@ class SpeedDependence(NamedTuple):
         """Whether any kind of contacts shows a dependence; wrong in 5 % of constant gases."""
         return any(kind is not None and kind.chance < _MAX_CHANCE for kind in self)
 
+    @property
+    def bead_weight(self) -> float:
+        """Probability of the law of the beads against a constant restitution.
+
+        1 where the test rejects that; 0 without a hint, since a law that contacts hardly determine
+        widens intervals.
+        """
+        beads = self.beads
+        if beads is None or beads.chance >= _HINT:
+            return 0.0
+        return 1.0 if beads.chance < _MAX_CHANCE else beads.law_probability(_EXPONENTS)
+
+    @property
+    def wall_weight(self) -> float:
+        """Whether the walls follow their law, 1 or 0."""
+        return 1.0 if self.walls is not None and self.walls.chance < _MAX_CHANCE else 0.0
+
     def fields(self, ends: NDArray[np.float64]) -> dict[str, Any]:
         """The fields of `CycleRestitution` and `MeanRestitution` that say so.
 
@@ -51,6 +73,8 @@ class SpeedDependence(NamedTuple):
             if kind:
                 fields[f'{prefix}restitution_exponent'] = kind.interval(ends)
                 fields[f'{prefix}impact_speed'] = kind.speed
+                lower, value, upper = kind.law.at(kind.speed).quantiles(ends).tolist()
+                fields[f'{prefix}impact_restitution'] = Interval(value, lower, upper)
         return fields
 
 

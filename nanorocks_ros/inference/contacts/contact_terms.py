@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import (
     ERROR_SCALES,
+    MIDDLE_NUISANCE,
     marginal,
     pair_table,
     rebound_table,
@@ -182,8 +183,21 @@ class ContactTerms:
     def bead_exponent(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
     ) -> RestitutionExponent | None:
-        """How the bead restitution depends on speed, as `wall_exponent`."""
-        return bead_exponent(self.collision_impacts, slowing, bias)
+        """How the bead restitution depends on speed, as `wall_exponent`.
+
+        Radii and vertical speeds, which the exponent takes for known, correct its law as much as
+        they do a constant restitution.
+        """
+        exponent = bead_exponent(self.collision_impacts, slowing, bias)
+        if exponent is None:
+            return None
+        known, unknown = (
+            Likelihood1D(restitution=_BEADS, log_likelihood=logs).posterior((0.0, 1.0))
+            for logs in (self.beads[MIDDLE_NUISANCE], marginal(self.beads))
+        )
+        factor = (1.0 - unknown.mean) / (1.0 - known.mean)
+        spread = math.sqrt(max(unknown.deviation**2 - known.deviation**2, 0.0))
+        return replace(exponent, law=exponent.law.corrected(factor, spread))
 
 
 def _slowed(term: Likelihood1D, loss: Measured, bias: float) -> Likelihood1D:

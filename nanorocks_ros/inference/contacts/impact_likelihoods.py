@@ -38,18 +38,25 @@ _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 
 class Impacts(Protocol):
-    """Contacts of one kind."""
+    """Contacts of one kind.
+
+    `rows`: a contact each; `gain`: as of `RestitutionLaw`.
+    """
 
     rows: NDArray[np.float64]
+    gain: float
 
     @property
     def speeds(self) -> NDArray[np.float64]:
         """Impact speeds, (n,), [m/s]."""
 
+    @property
+    def reference(self) -> float:
+        """Geometric mean of the impact speeds, [m/s]."""
+
     def logs(
         self,
         kept: NDArray[np.float64],
-        reference: float,
         restitutions: NDArray[np.float64],
         exponents: NDArray[np.float64],
     ) -> NDArray[np.float64]:
@@ -67,6 +74,8 @@ class ReboundImpacts:
         Of their errors.
     """
 
+    gain = 0.0
+
     def __init__(self, impacts: NDArray[np.float64], scale: float) -> None:
         self.rows = impacts.copy()
         self.rows[:, [INCOMING_ERROR, OUTGOING_ERROR, WALL_ERROR]] *= scale
@@ -76,15 +85,19 @@ class ReboundImpacts:
         """As of `Impacts`."""
         return self.rows[:, INCOMING]
 
+    @property
+    def reference(self) -> float:
+        """As of `Impacts`."""
+        return _geometric_mean(self.speeds)
+
     def logs(
         self,
         kept: NDArray[np.float64],
-        reference: float,
         restitutions: NDArray[np.float64],
         exponents: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         """As of `Impacts`."""
-        return _rebound_logs(self.rows, kept, reference, restitutions, exponents)
+        return _rebound_logs(self.rows, kept, self.reference, restitutions, exponents)
 
 
 class CollisionImpacts:
@@ -96,24 +109,34 @@ class CollisionImpacts:
         From `collision_impacts`.
     """
 
+    gain = _MEAN_GAIN
+
     def __init__(self, impacts: NDArray[np.float32]) -> None:
         self.rows = impacts.astype(np.float64)
 
     @property
     def speeds(self) -> NDArray[np.float64]:
         """As of `Impacts`."""
-        return self.rows[:, LOSS_COLUMNS] / _MEAN_GAIN
+        return self.rows[:, LOSS_COLUMNS] / self.gain
+
+    @property
+    def reference(self) -> float:
+        """As of `Impacts`."""
+        return _geometric_mean(self.speeds)
 
     def logs(
         self,
         kept: NDArray[np.float64],
-        reference: float,
         restitutions: NDArray[np.float64],
         exponents: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         """As of `Impacts`."""
-        logs = _collision_logs(self.rows, kept, reference, restitutions, exponents)
+        logs = _collision_logs(self.rows, kept, self.reference, restitutions, exponents)
         return logs / _COLLISION_SCATTER**2
+
+
+def _geometric_mean(speeds: NDArray[np.float64]) -> float:
+    return math.exp(float(np.log(speeds).mean()))
 
 
 @compiled

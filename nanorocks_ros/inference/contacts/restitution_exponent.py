@@ -85,6 +85,19 @@ class RestitutionExponent:
         below = float(self.exponent.probability[axis < 0.0].sum())
         return 2.0 * min(below, 1.0 - below)
 
+    def law_probability(self, width: float) -> float:
+        """Probability of the law against a constant restitution; before, they are equally likely.
+
+        Parameters
+        ----------
+        width : float
+            Of the prior of the exponent, flat about 0: the ratio of the evidence of both is that
+            of its densities at 0 before and after (Savage, Dickey).
+        """
+        axis = self.exponent.restitution
+        density = float(np.interp(0.0, axis, self.exponent.probability, 0.0, 0.0))
+        return 1.0 / (1.0 + width * density / float(axis[1] - axis[0]))
+
 
 def wall_exponent(
     impacts: NDArray[np.float64], scale: float, slowing: Slowing, bias: float
@@ -125,36 +138,31 @@ def _exponent(impacts: Impacts, slowing: Slowing, bias: float) -> RestitutionExp
     contacts = len(impacts.rows)
     if contacts < MIN_CONTACTS:
         return None
-    reference = math.exp(float(np.log(impacts.speeds).mean()))
     kept = _kept(impacts, slowing)
     rubbed = FRICTION_FACTOR * float(slowing.values[1] * impacts.rows[:, FRICTION_LENGTH].mean())
     slope_bias = math.hypot(bias, _RUBBING_ERROR * rubbed)
-    restitutions = _likely_restitutions(impacts, kept.mean(axis=0), reference)
-    by_slowing = [impacts.logs(part, reference, restitutions, EXPONENTS) for part in kept]
+    restitutions = _likely_restitutions(impacts, kept.mean(axis=0))
+    by_slowing = [impacts.logs(part, restitutions, EXPONENTS) for part in kept]
     logs = log_sum(np.array(by_slowing).reshape(len(kept), -1)).reshape(by_slowing[0].shape)
     best = float(restitutions[np.argmax(logs.max(axis=1))])
     term = Likelihood1D(restitution=EXPONENTS, log_likelihood=log_sum(logs))
     exponent_bias = slope_bias / max(1.0 - best, slope_bias)
     return RestitutionExponent(
         contacts=contacts,
-        speed=reference,
+        speed=impacts.reference,
         restitution=best,
         exponent=term.convolved(exponent_bias).posterior(
             (float(EXPONENTS[0]), float(EXPONENTS[-1]))
         ),
-        law=law_posterior(
-            (restitutions, EXPONENTS), logs, impacts.speeds, reference, (bias, exponent_bias)
-        ),
+        law=law_posterior((restitutions, EXPONENTS), logs, impacts, (bias, exponent_bias)),
     )
 
 
-def _likely_restitutions(
-    impacts: Impacts, kept: NDArray[np.float64], reference: float
-) -> NDArray[np.float64]:
+def _likely_restitutions(impacts: Impacts, kept: NDArray[np.float64]) -> NDArray[np.float64]:
     """Restitutions at the reference speed that are likely with some exponent."""
     grid = np.linspace(0.0, _MAX_RESTITUTION, _STEPS)
     for _ in range(_ROUNDS):
-        logs = impacts.logs(kept, reference, grid, _FEW).max(axis=1)
+        logs = impacts.logs(kept, grid, _FEW).max(axis=1)
         likely = np.flatnonzero(logs > logs.max() - _DEPTH)
         first, last = max(likely[0] - 1, 0), min(likely[-1] + 1, _STEPS - 1)
         grid = np.linspace(grid[first], grid[last], _STEPS)

@@ -10,7 +10,7 @@ Tested by ``test/inference/contacts/test_restitution_law.py``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +21,8 @@ from nanorocks_ros.numerics.compiled import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from nanorocks_ros.inference.contacts.impact_likelihoods import Impacts
 
 # Points of the posterior along each axis, and the depth of the log likelihood at which it ends.
 _RESTITUTIONS, _EXPONENTS, _DEPTH = 81, 241, 18.0
@@ -45,6 +47,9 @@ class RestitutionLaw:
         Standard deviation of a systematic error that is the same at all speeds.
     impact_speeds : ndarray (m,), [m/s]
         Of the contacts that were seen.
+    gain : float
+        1 + restitution where the impact speeds hold if the restitution is that of the reference
+        speed, and change with it as of collisions seen in projection; 0: they are measured.
     """
 
     speed: float
@@ -53,6 +58,7 @@ class RestitutionLaw:
     probabilities: NDArray[np.float64]
     bias: float
     impact_speeds: NDArray[np.float64]
+    gain: float = 0.0
 
     def at(self, speed: float) -> Posterior1D:
         """The restitution at an impact speed, [m/s]."""
@@ -66,8 +72,14 @@ class RestitutionLaw:
         The root of the mean square of the restitutions of single contacts, each weighted by the
         square of its impact speed.
         """
-        return self._posterior(
-            _energy_weighted(self.restitutions, self.exponents, self.impact_speeds / self.speed)
+        return self._posterior(_energy_weighted(self))
+
+    def corrected(self, factor: float, error: float) -> RestitutionLaw:
+        """The law with all losses times a factor, and a further error of the restitution."""
+        return replace(
+            self,
+            restitutions=np.clip(1.0 - factor * (1.0 - self.restitutions), 0.0, 1.0),
+            bias=math.hypot(self.bias, error),
         )
 
     def _posterior(self, values: NDArray[np.float64]) -> Posterior1D:
@@ -93,8 +105,7 @@ class RestitutionLaw:
 def law_posterior(
     grid: tuple[NDArray[np.float64], NDArray[np.float64]],
     logs: NDArray[np.float64],
-    speeds: NDArray[np.float64],
-    reference: float,
+    impacts: Impacts,
     biases: tuple[float, float],
 ) -> RestitutionLaw:
     """The law from the log likelihood of its two unknowns; flat priors.
@@ -104,9 +115,8 @@ def law_posterior(
     grid : tuple of 2 ndarrays
         Restitutions at the reference speed, (r,), and exponents, (p,), both rising; 4 or more.
     logs : ndarray (r, p)
-    speeds : ndarray (m,), [m/s]
-        Impact speeds.
-    reference : float, [m/s]
+    impacts : Impacts
+        Contacts; the reference speed is the geometric mean of their speeds.
     biases : tuple of 2 floats
         Standard deviations of systematic errors of the restitution at all speeds, and of the
         exponent.
@@ -132,12 +142,13 @@ def law_posterior(
     weight = np.exp(fine - fine.max())
     values, powers = np.meshgrid(*axes, indexing='ij')
     return RestitutionLaw(
-        speed=reference,
+        speed=impacts.reference,
         restitutions=values[likely],
         exponents=powers[likely],
         probabilities=weight[likely] / weight[likely].sum(),
         bias=biases[0],
-        impact_speeds=speeds,
+        impact_speeds=impacts.speeds,
+        gain=impacts.gain,
     )
 
 
@@ -147,14 +158,13 @@ def _around(axis: NDArray[np.float64], likely: NDArray[np.bool_]) -> tuple[float
     return float(axis[max(places[0] - 1, 0)]), float(axis[min(places[-1] + 1, axis.size - 1)])
 
 
-def _energy_weighted(
-    restitutions: NDArray[np.float64], exponents: NDArray[np.float64], ratios: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Energy-weighted restitution of impacts at ratios of the reference speed, (n,)."""
-    distinct, place = np.unique(exponents, return_inverse=True)
+def _energy_weighted(law: RestitutionLaw) -> NDArray[np.float64]:
+    """Energy-weighted restitution at each point of the law, (n,)."""
+    distinct, place = np.unique(law.exponents, return_inverse=True)
     order = np.argsort(place, kind='stable')
-    means = np.empty(restitutions.size)
-    _set_means(means, restitutions, order, place.astype(np.int64), distinct, ratios)
+    means = np.empty(law.restitutions.size)
+    ratios = law.impact_speeds / law.speed
+    _set_means(means, law.restitutions, order, place.astype(np.int64), distinct, ratios, law.gain)
     return means
 
 
@@ -166,18 +176,26 @@ def _set_means(
     place: NDArray[np.int64],
     exponents: NDArray[np.float64],
     ratios: NDArray[np.float64],
+    gain: float,
 ) -> None:
-    """Set the energy-weighted restitutions of points that are ordered by their exponents."""
-    squares = ratios * ratios
-    total = squares.sum()
+    """Set the energy-weighted restitutions of points, which `order` sorts by their exponents."""
     last = -1
-    losses = np.empty(ratios.size)
+    powers = np.empty(ratios.size)
     for k in order:
+        exponent, mean = exponents[place[k]], 1.0 - restitutions[k]
         if place[k] != last:
             last = place[k]
-            losses = ratios ** exponents[last]
-        left = 0.0
+            powers = ratios**exponent
+        scale = gain / (2.0 - mean) if gain > 0.0 else 1.0
+        unit = mean * scale**exponent
+        left, total = 0.0, 0.0
         for i in range(ratios.size):
-            value = max(1.0 - (1.0 - restitutions[k]) * losses[i], 0.0)
-            left += value * value * squares[i]
+            loss, ratio = min(unit * powers[i], 1.0), ratios[i]
+            if gain > 0.0:
+                # The speed is that over 1 + restitution, to second order.
+                change = exponent * (loss - mean) / (2.0 - 0.5 * (loss + mean))
+                loss = min(loss * (1.0 + change + 0.5 * change * change), 1.0)
+                ratio *= gain / (2.0 - loss)
+            left += ((1.0 - loss) * ratio) ** 2
+            total += ratio * ratio
         means[k] = math.sqrt(left / total)

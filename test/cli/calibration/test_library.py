@@ -6,6 +6,8 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 
+PAIRS = '--restitution-law', 'pairs', '--restitution-pairs'
+
 
 @pytest.mark.parametrize(
     ('arguments', 'code', 'message'),
@@ -18,7 +20,7 @@ from nanorocks_ros.cli.main import main
         (('--tray', '1', '-o', 'a.npz', '--drag', '-1'), 2, 'drag'),
         (('--tray', '1', '-o', 'a.npz', '--restitution-law', 'linear'), 2, 'none of constant'),
         (
-            tuple('--tray 1 -o a.npz --restitution-law pairs --restitution-pairs 0.9 0.8'.split()),
+            ('--tray', '1', '-o', 'a.npz', *PAIRS, '0.9', '0.8'),
             1,
             'restitution_pairs: 2 restitutions for 1 species',
         ),
