@@ -54,6 +54,9 @@ class Impacts(Protocol):
     def reference(self) -> float:
         """Geometric mean of the impact speeds, [m/s]."""
 
+    def part(self, places: NDArray[np.int64]) -> Impacts:
+        """Some of them."""
+
     def logs(
         self,
         kept: NDArray[np.float64],
@@ -90,6 +93,10 @@ class ReboundImpacts:
         """As of `Impacts`."""
         return _geometric_mean(self.speeds)
 
+    def part(self, places: NDArray[np.int64]) -> ReboundImpacts:
+        """As of `Impacts`."""
+        return ReboundImpacts(self.rows[places], 1.0)
+
     def logs(
         self,
         kept: NDArray[np.float64],
@@ -111,7 +118,7 @@ class CollisionImpacts:
 
     gain = _MEAN_GAIN
 
-    def __init__(self, impacts: NDArray[np.float32]) -> None:
+    def __init__(self, impacts: NDArray[np.float32] | NDArray[np.float64]) -> None:
         self.rows = impacts.astype(np.float64)
 
     @property
@@ -123,6 +130,10 @@ class CollisionImpacts:
     def reference(self) -> float:
         """As of `Impacts`."""
         return _geometric_mean(self.speeds)
+
+    def part(self, places: NDArray[np.int64]) -> CollisionImpacts:
+        """As of `Impacts`."""
+        return CollisionImpacts(self.rows[places])
 
     def logs(
         self,

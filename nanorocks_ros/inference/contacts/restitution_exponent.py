@@ -138,7 +138,7 @@ def _exponent(impacts: Impacts, slowing: Slowing, bias: float) -> RestitutionExp
     contacts = len(impacts.rows)
     if contacts < MIN_CONTACTS:
         return None
-    kept = _kept(impacts, slowing)
+    kept = kept_beside_contacts(impacts, slowing)
     rubbed = FRICTION_FACTOR * float(slowing.values[1] * impacts.rows[:, FRICTION_LENGTH].mean())
     slope_bias = math.hypot(bias, _RUBBING_ERROR * rubbed)
     restitutions = _likely_restitutions(impacts, kept.mean(axis=0))
@@ -169,7 +169,7 @@ def _likely_restitutions(impacts: Impacts, kept: NDArray[np.float64]) -> NDArray
     return grid
 
 
-def _kept(impacts: Impacts, slowing: Slowing) -> NDArray[np.float64]:
+def kept_beside_contacts(impacts: Impacts, slowing: Slowing) -> NDArray[np.float64]:
     """Part of the restitution that is left in the measured speeds, (k, n).
 
     For k equally likely cases, which have the mean and the covariance of what is known of drag and
