@@ -155,8 +155,8 @@ def _impacts_part(context: Context) -> Picture | str:
         path=path,
         caption='What Figure 13 asks, answered by single contacts: the speed along the normal of '
         'each, not the mean speed of the gas, and its restitution, not what is left of a mean '
-        f'speed after a second. {_law_in_words(values["beads"])} The slowest range reads low where '
-        'it holds few contacts: an error of the speed after a contact is in both axes.',
+        f'speed after a second. {_law_in_words(values["beads"])} The slowest range reads '
+        'low: an error of the speed after a contact is in both axes.',
     )
 
 
