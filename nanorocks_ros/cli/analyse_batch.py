@@ -39,13 +39,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
     )
+    group.add_argument(
+        '--statistics',
+        action='store_true',
+        help='velocity distribution, energies, collisions, g(r) and S(k) as well, of each '
+        'recording and in the report',
+    )
 
 
 def is_batch(options: argparse.Namespace) -> bool:
     """Whether the arguments name many recordings."""
     from nanorocks_ros.recordings.bag.find_bags import is_collection, is_pattern
 
-    batch_options = options.workers, options.scheduler
+    batch_options = options.workers, options.scheduler, options.statistics or None
     if len(options.bags) > 1 or any(option is not None for option in batch_options):
         return True
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
@@ -86,6 +92,7 @@ def run_many(options: argparse.Namespace) -> int:
         settings=settings,
         image_topic=options.image_topic,
         told=told_settings(options, options.parameters),
+        statistics=options.statistics,
     )
     with _BatchProgress() as progress:
         batch = run_batch(plan, workers, progress)
