@@ -59,7 +59,7 @@ class RestitutionSources:
         With friction beside it where contacts are believed alone.
     dependence : SpeedDependence
         Where contacts show laws of the impact speed, these are the restitutions of the headline,
-        weighted by energy; where they hint at one, that of the beads has its share.
+        weighted by energy; where they need not, that of the beads has its share.
     """
 
     joint: Posterior
@@ -112,8 +112,8 @@ class RestitutionSources:
     def _laws(self) -> tuple[Posterior1D | None, Posterior1D | None]:
         """Restitutions of beads and walls where their laws count; None where they do not."""
         dependence, by_law, walls_by_law = self.dependence, None, None
-        if dependence.beads is not None and dependence.bead_weight > 0.0:
-            by_law = dependence.beads.law.energy_weighted
+        if dependence.bead_law is not None and dependence.bead_weight > 0.0:
+            by_law = dependence.bead_law.energy_weighted
             constant = self.beads
             if self.headline is not Headline.CONTACTS:
                 constant = self.joint.beads

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
     from nanorocks_ros.inference.contacts.restitution_exponent import RestitutionExponent
+    from nanorocks_ros.inference.contacts.restitution_law import RestitutionLaw
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.settings import PriorSettings
 
@@ -24,10 +25,9 @@ if TYPE_CHECKING:
 # tested, but intervals are rather too wide: at most 5 % of gases of constant restitution have a
 # smaller one in either (`python -m benchmarks speed_dependence`).
 _MAX_CHANCE = 0.05
-# Chance below which a dependence that is not certain enters the restitution of the beads, and the
-# range of exponents of which each is then as likely as that the restitution is constant: those of
-# known materials are 0 to 0.6.
-_HINT, _EXPONENTS = 0.32, 1.5
+# Largest exponent of a law that is not certain: those of known materials are 0 to 0.6. All up to
+# it together are as likely as a constant restitution, before contacts are seen.
+_HIGHEST_EXPONENT = 0.75
 # Of the contacts of an estimate before.
 _MORE = 1.1
 
@@ -47,13 +47,21 @@ class SpeedDependence(NamedTuple):
     def bead_weight(self) -> float:
         """Probability of the law of the beads against a constant restitution.
 
-        1 where the test rejects that; 0 without a hint, since a law that contacts hardly determine
-        widens intervals.
+        1 where the test rejects that; 0 without a law.
         """
         beads = self.beads
-        if beads is None or beads.chance >= _HINT:
+        if beads is None or self.bead_law is None:
             return 0.0
-        return 1.0 if beads.chance < _MAX_CHANCE else beads.law_probability(_EXPONENTS)
+        if beads.chance < _MAX_CHANCE:
+            return 1.0
+        return beads.law_probability(_HIGHEST_EXPONENT)
+
+    @property
+    def bead_law(self) -> RestitutionLaw | None:
+        """The law of the beads: of any exponent where it is certain, else of known materials."""
+        if self.beads is None or self.beads.chance < _MAX_CHANCE:
+            return None if self.beads is None else self.beads.law
+        return self.beads.law.up_to(_HIGHEST_EXPONENT)
 
     @property
     def wall_weight(self) -> float:

@@ -140,7 +140,7 @@ def test_a_law_of_the_impact_speed_is_the_headline_weighted_by_energy(tables):
     assert math.isnan(sources.contact_intervals(ENDS)[0].value)
 
 
-def test_a_hint_of_a_law_has_its_share_of_the_headline(tables):
+def test_a_law_that_is_not_certain_has_its_share_of_the_headline(tables):
     arguments = tables, decay(tables, 0.89, 0.97), rebounds(0.97), PRIOR
     constant = restitution_sources(*arguments)
     hint = SpeedDependence(beads=wide(law()))
@@ -148,7 +148,7 @@ def test_a_hint_of_a_law_has_its_share_of_the_headline(tables):
     assert shared.headline is Headline.JOINT
     weight = hint.bead_weight
     assert 0.0 < weight < 1.0
-    by_law = hint.beads.law.energy_weighted.mean
+    by_law = hint.bead_law.energy_weighted.mean
     assert shared.means[0].value == pytest.approx(
         (1.0 - weight) * constant.means[0].value + weight * by_law, abs=1e-3
     )

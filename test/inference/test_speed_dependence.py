@@ -92,12 +92,21 @@ def exponent(mean, deviation):
 def test_a_law_counts_the_more_the_less_likely_a_constant_restitution_is():
     weights = [
         SpeedDependence(beads=exponent(mean, 0.15)).bead_weight
-        for mean in (0.0, 0.1, 0.2, 0.25, 0.4)
+        for mean in (-0.2, 0.0, 0.1, 0.2, 0.25, 0.4)
     ]
-    assert weights[:2] == [0.0, 0.0]
-    assert 0.2 < weights[2] < weights[3] < 0.8
-    assert weights[4] == 1.0
+    assert 0.05 < weights[0] < weights[1] < weights[2] < weights[3] < weights[4] < 0.8
+    assert weights[5] == 1.0
     assert SpeedDependence().bead_weight == 0.0
+
+
+def test_a_law_that_is_not_certain_is_one_of_known_materials():
+    uncertain, certain = (
+        SpeedDependence(beads=exponent(mean, 0.15)).bead_law for mean in (0.2, 0.4)
+    )
+    assert 0.0 <= uncertain.exponents.min() <= uncertain.exponents.max() <= 0.75
+    assert uncertain.probabilities.sum() == pytest.approx(1.0)
+    assert certain is not None
+    assert SpeedDependence().bead_law is None
 
 
 def test_walls_follow_their_law_where_it_is_certain():
@@ -106,8 +115,10 @@ def test_walls_follow_their_law_where_it_is_certain():
     assert SpeedDependence().wall_weight == 0.0
 
 
-def test_a_law_and_a_constant_that_are_equally_likely_are_equally_probable():
-    # The density of the exponent at 0 is that of the prior.
-    undecided = exponent(0.3, 0.3)
-    density = math.exp(-0.5) / (0.3 * math.sqrt(2.0 * math.pi))
-    assert undecided.law_probability(1.0 / density) == pytest.approx(0.5, abs=0.01)
+def test_the_probability_of_a_law_follows_from_the_density_of_its_exponent_at_0():
+    # Half of a Gaussian from 0 on.
+    density = 2.0 / (0.2 * math.sqrt(2.0 * math.pi))
+    assert exponent(0.0, 0.2).law_probability(0.75) == pytest.approx(
+        1.0 / (1.0 + 0.75 * density), abs=0.01
+    )
+    assert exponent(-0.9, 0.01).law_probability(0.75) == 0.0

@@ -85,18 +85,21 @@ class RestitutionExponent:
         below = float(self.exponent.probability[axis < 0.0].sum())
         return 2.0 * min(below, 1.0 - below)
 
-    def law_probability(self, width: float) -> float:
-        """Probability of the law against a constant restitution; before, they are equally likely.
+    def law_probability(self, highest: float) -> float:
+        """Probability of a law against a constant restitution; before, they are equally likely.
 
         Parameters
         ----------
-        width : float
-            Of the prior of the exponent, flat about 0: the ratio of the evidence of both is that
-            of its densities at 0 before and after (Savage, Dickey).
+        highest : float, > 0
+            Exponent up to which that of the law may be, flat from 0 on. The ratio of the evidence
+            of both is that of its densities at 0 before and after (Savage, Dickey).
         """
-        axis = self.exponent.restitution
-        density = float(np.interp(0.0, axis, self.exponent.probability, 0.0, 0.0))
-        return 1.0 / (1.0 + width * density / float(axis[1] - axis[0]))
+        axis, probability = self.exponent.restitution, self.exponent.probability
+        inside = float(probability[(axis >= 0.0) & (axis <= highest)].sum())
+        if not inside > 0.0:
+            return 0.0
+        density = float(np.interp(0.0, axis, probability, 0.0, 0.0)) / float(axis[1] - axis[0])
+        return 1.0 / (1.0 + highest * density / inside)
 
 
 def wall_exponent(

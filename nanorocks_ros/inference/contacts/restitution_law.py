@@ -74,6 +74,19 @@ class RestitutionLaw:
         """
         return self._posterior(_energy_weighted(self))
 
+    def up_to(self, exponent: float) -> RestitutionLaw | None:
+        """The law if its exponent is from 0 to some value; None if that is not likely at all."""
+        inside = (self.exponents >= 0.0) & (self.exponents <= exponent)
+        if not inside.any():
+            return None
+        weight = self.probabilities[inside]
+        return replace(
+            self,
+            restitutions=self.restitutions[inside],
+            exponents=self.exponents[inside],
+            probabilities=weight / weight.sum(),
+        )
+
     def corrected(self, factor: float, error: float) -> RestitutionLaw:
         """The law with all losses times a factor, and a further error of the restitution."""
         return replace(

@@ -72,6 +72,14 @@ def test_speeds_of_collisions_follow_from_the_law_itself():
     assert abs(replace(known(), impact_speeds=seen).energy_weighted.mean - mean) > 5e-3
 
 
+def test_a_law_may_be_limited_to_some_exponents():
+    posterior = gaussian(0.8, 0.5, (0.01, 0.2))
+    limited = posterior.up_to(0.4)
+    assert 0.0 <= limited.exponents.min() <= limited.exponents.max() <= 0.4
+    assert limited.probabilities.sum() == pytest.approx(1.0)
+    assert gaussian(0.8, -0.8, (0.01, 0.02)).up_to(0.4) is None
+
+
 def test_a_correction_scales_the_losses_and_adds_its_error():
     corrected = known().corrected(0.5, 0.01)
     assert corrected.at(REFERENCE).mean == pytest.approx(0.9, abs=1e-4)

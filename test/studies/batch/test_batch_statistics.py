@@ -16,7 +16,7 @@ def batch(tmp_path_factory):
     """Two bags, one too short for velocities, analysed with statistics."""
     folder = tmp_path_factory.mktemp('statistics')
     short_film(folder / 'bags' / 'long', 1, 8.0)
-    short_film(folder / 'bags' / 'short', 2, 0.5)
+    short_film(folder / 'bags' / 'short', 2, 1.6)
     arguments = ['analyse', str(folder / 'bags'), '-o', str(folder / 'results')]
     assert main([*arguments, '--statistics', '--workers', '1']) == 0
     return folder
@@ -43,7 +43,7 @@ def test_the_report_has_a_table_and_a_figure_of_each_tray(batch):
     page = (batch / 'results' / 'report.html').read_text()
     assert 'The gas: velocities, collisions, pairs, structure' in page
     assert 'wall hits per mm of path' in page
-    assert 'Tray 1 in long, of the recordings that with the longest time' in page
+    assert 'Tray 1 in long' in page
     assert 'no bead moves measurably' in page
 
 
