@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import defaultdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
@@ -19,7 +20,6 @@ from nanorocks_ros.studies.gas_statistics.tray_statistics import GasChoices, tra
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import CorEstimate
@@ -117,7 +117,7 @@ def statistics_section(results: Sequence[BagResults]) -> Section | None:
     for result in results:
         for number, values in _read(result.folder).items():
             if 'reason' in values:
-                reasons.append(f'{result.name}: {values["reason"]}.')
+                reasons.append(f'{Path(result.name).name}: {values["reason"]}.')
             else:
                 by_tray[int(number)].append((result, values))
     if not by_tray and not reasons:
@@ -130,9 +130,9 @@ def statistics_section(results: Sequence[BagResults]) -> Section | None:
         section.parts.append(
             Picture(
                 path=longest.folder / figure_name(tray),
-                caption=f'Tray {tray} in {longest.name}, of the recordings that with the '
-                f'longest time used, {values["seconds"]:.0f} s. The figures of the others lie '
-                'beside their tables.',
+                caption=f'Tray {tray} in {Path(longest.name).name}, the recording with the most '
+                f'time used, {values["seconds"]:.0f} s. The figures of the others lie beside '
+                'their tables.',
             )
         )
     return Section(title=section.title, parts=[*section.parts, *reasons])
