@@ -71,7 +71,7 @@ def write_batch_report(
                 *_cycles(together),
                 _recordings(batch, settings),
             ]
-            gas = statistics_section(batch.counted)
+            gas = statistics_section({result.name: result.folder for result in batch.counted})
             if gas is not None:
                 sections.insert(_AFTER_FIGURES, gas)
             if batch.failed:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import CorEstimate
     from nanorocks_ros.settings import PipelineSettings
-    from nanorocks_ros.studies.batch.batch_analysis import BagResults
 
 _PER_MM = 1e-3
 _USUAL = GasChoices()
@@ -104,22 +103,22 @@ def _choices(settings: PipelineSettings, last: CorEstimate | None) -> GasChoices
     return GasChoices(start=settings.cooling.delay, restitution=beads, wall_restitution=walls)
 
 
-def statistics_section(results: Sequence[BagResults]) -> Section | None:
+def statistics_section(results: Mapping[str, Path]) -> Section | None:
     """The section of the report; None for a batch without statistics.
 
     Parameters
     ----------
-    results : sequence of BagResults
-        Each recording once.
+    results : mapping of str to Path
+        Folder of the results of each recording, by its name.
     """
-    by_tray: dict[int, list[tuple[BagResults, dict[str, Any]]]] = defaultdict(list)
+    by_tray: dict[int, list[tuple[str, dict[str, Any]]]] = defaultdict(list)
     reasons: list[str] = []
-    for result in results:
-        for number, values in _read(result.folder).items():
+    for name, folder in results.items():
+        for number, values in _read(folder).items():
             if 'reason' in values:
-                reasons.append(f'{Path(result.name).name}: {values["reason"]}.')
+                reasons.append(f'{Path(name).name}: {values["reason"]}.')
             else:
-                by_tray[int(number)].append((result, values))
+                by_tray[int(number)].append((name, values))
     if not by_tray and not reasons:
         return None
     section = Section(title='The gas: velocities, collisions, pairs, structure')
@@ -129,8 +128,8 @@ def statistics_section(results: Sequence[BagResults]) -> Section | None:
         longest, values = max(own, key=lambda pair: float(pair[1]['seconds']))
         section.parts.append(
             Picture(
-                path=longest.folder / figure_name(tray),
-                caption=f'Tray {tray} in {Path(longest.name).name}, the recording with the most '
+                path=results[longest] / figure_name(tray),
+                caption=f'Tray {tray} in {Path(longest).name}, the recording with the most '
                 f'time used, {values["seconds"]:.0f} s. The figures of the others lie beside '
                 'their tables.',
             )
@@ -146,7 +145,7 @@ def _read(folder: Path) -> dict[str, dict[str, Any]]:
     return values if isinstance(values, dict) else {}
 
 
-def _table(by_tray: Mapping[int, list[tuple[BagResults, dict[str, Any]]]]) -> Table:
+def _table(by_tray: Mapping[int, list[tuple[str, dict[str, Any]]]]) -> Table:
     rows = []
     for number, own in sorted(by_tray.items()):
         kinds = [values['species'] for _, values in own]
