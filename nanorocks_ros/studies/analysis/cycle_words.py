@@ -252,6 +252,8 @@ def _exponent_lines(cor: CorEstimate) -> list[str]:
             f'  by that law, at these speeds: {at_speeds}; the COR above loses as much energy in '
             'the contacts that were seen'
         )
+    elif cor.headline is Headline.JOINT and cor.restitution != cor.joint_restitution:
+        lines.append('  the interval of the beads allows for such a law, as the contacts do')
     return lines
 
 

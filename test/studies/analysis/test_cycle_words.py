@@ -158,6 +158,9 @@ def test_how_the_restitution_goes_with_speed_is_said():
     constant = replace(cor, quality=NOTHING_WRONG, headline=Headline.JOINT)
     assert 'need not depend' in text_of(constant)
     assert 'by that law' not in text_of(constant)
+    assert 'allows for such a law' in text_of(constant)
+    plain = replace(constant, joint_restitution=constant.restitution)
+    assert 'allows for such a law' not in text_of(plain)
     assert 'depend' not in text_of(FINAL)
 
 
