@@ -52,6 +52,7 @@ ALL = (
     'friction_films',
     'drag',
     'speed_dependence',
+    'speed_headlines',
     'sensitivity',
     'gas_statistics',
     'engine',

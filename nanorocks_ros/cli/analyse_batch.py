@@ -39,13 +39,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
     )
+    group.add_argument(
+        '--statistics',
+        action='store_true',
+        help='velocity distribution, energies, collisions, g(r) and S(k) as well, of each '
+        'recording and in the report',
+    )
 
 
 def is_batch(options: argparse.Namespace) -> bool:
     """Whether the arguments name many recordings."""
     from nanorocks_ros.recordings.bag.find_bags import is_collection, is_pattern
 
-    batch_options = options.workers, options.scheduler
+    batch_options = options.workers, options.scheduler, options.statistics or None
     if len(options.bags) > 1 or any(option is not None for option in batch_options):
         return True
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
@@ -86,6 +92,7 @@ def run_many(options: argparse.Namespace) -> int:
         settings=settings,
         image_topic=options.image_topic,
         told=told_settings(options, options.parameters),
+        statistics=options.statistics,
     )
     with _BatchProgress() as progress:
         batch = run_batch(plan, workers, progress)
@@ -193,13 +200,12 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         lines.append(f'from {source}')
         if restitution.speed_dependent:
             lines += [
-                f'exponent of 1 - restitution of {kind}: {text(name, 1.0, 2)} at '
-                f'{1e3 * speed:.2f} mm/s'
-                for kind, name, speed in (
-                    ('beads', 'restitution_exponent', restitution.impact_speed),
-                    ('walls', 'wall_restitution_exponent', restitution.wall_impact_speed),
-                )
-                if values[name] is not None
+                f'{kind}: exponent of 1 - restitution '
+                f'{text(f"{prefix}restitution_exponent", 1.0, 2)}; '
+                f'restitution {text(f"{prefix}impact_restitution", 1.0, 3)} at '
+                f'{1e3 * values[f"{prefix}impact_speed"]:.2f} mm/s'
+                for kind, prefix in (('beads', ''), ('walls', 'wall_'))
+                if values[f'{prefix}restitution_exponent'] is not None
             ]
     if tray.left_out:
         lines.append(

@@ -149,6 +149,11 @@ def _print(statistics: TrayStatistics) -> None:
                 f'mean free path {_MM * free.value:.2f} ± {_MM * free.error:.2f} mm '
                 f'(theory {_MM * rate.theory_mean_free_path:.2f})'
             )
+        if (walls := statistics.wall_hits[kind]) is not None:
+            print(
+                f'    {walls.per_path.value / _MM:.3f} ± {walls.per_path.error / _MM:.3f} hits of '
+                f'side walls per mm of projected path (theory {walls.theory_per_path / _MM:.3f})'
+            )
     for cycle in statistics.clustering:
         if math.isfinite(cycle.onset):
             print(f'  cycle {cycle.cycle}: clustering from {cycle.onset:.1f} s on')

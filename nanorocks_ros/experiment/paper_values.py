@@ -39,6 +39,12 @@ PAPER_RESTITUTION = 0.89
 PAPER_RESTITUTION_RANGE = (0.55, 0.94)
 """Of all trays (abstract)."""
 
+PAPER_NARROW_SPEED = 5e-3
+"""Collision speed above which its instantaneous restitutions scatter little, [m/s] (figure 13)."""
+
+PAPER_HIGHEST_RESTITUTION = 2.0
+"""Highest of its instantaneous restitutions, of slow beads (section 4.2)."""
+
 PAPER_WALL_RESTITUTION = 0.99
 """Of its search (section 4.1)."""
 

@@ -195,6 +195,7 @@ class MeanRestitution:
     drag : Measured, [1/s]
     restitution_exponent, wall_restitution_exponent : Interval
     impact_speed, wall_impact_speed : float, [m/s]
+    impact_restitution, wall_impact_restitution : Interval
     speed_dependent : bool
         Whether an exponent is not 0.
     """
@@ -213,4 +214,6 @@ class MeanRestitution:
     wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
     impact_speed: float = UNKNOWN
     wall_impact_speed: float = UNKNOWN
+    impact_restitution: Interval = UNKNOWN_INTERVAL
+    wall_impact_restitution: Interval = UNKNOWN_INTERVAL
     speed_dependent: bool = False

@@ -54,6 +54,23 @@ class Posterior1D:
         below = np.concatenate(([0.0], np.cumsum(self.probability)))
         return np.asarray(np.interp(probabilities, below / below[-1], edges))
 
+    def mixed_with(self, other: Posterior1D, weight: float) -> Posterior1D:
+        """The posterior where another one holds with some probability, the weight."""
+        low = min(self.restitution[0], other.restitution[0])
+        high = max(self.restitution[-1], other.restitution[-1])
+        edges = np.linspace(low, high, _FINE + 1)
+        below = (1.0 - weight) * self._below(edges) + weight * other._below(edges)
+        return Posterior1D(
+            restitution=0.5 * (edges[1:] + edges[:-1]), probability=np.diff(below) / below[-1]
+        )
+
+    def _below(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Probability below some places, (n,); each entry extends half way to its neighbours."""
+        axis = self.restitution
+        edges = np.concatenate(([axis[0]], 0.5 * (axis[1:] + axis[:-1]), [axis[-1]]))
+        below = np.concatenate(([0.0], np.cumsum(self.probability)))
+        return np.asarray(np.interp(places, edges, below / below[-1]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Likelihood1D:

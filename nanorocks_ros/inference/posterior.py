@@ -17,6 +17,7 @@ from scipy.interpolate import RectBivariateSpline
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL
 from nanorocks_ros.inference.decay.decay_tables import BEAD_POWER, WALL_POWER
+from nanorocks_ros.inference.likelihood_1d import Posterior1D
 from nanorocks_ros.numerics.splines import spline_basis
 
 if TYPE_CHECKING:
@@ -78,6 +79,11 @@ class Posterior:
                 [mixed, float(p.sum(axis=0) @ y**2)],
             ]
         )
+
+    @property
+    def beads(self) -> Posterior1D:
+        """Of the beads alone, marginalised over the walls."""
+        return Posterior1D(restitution=self.restitution, probability=self.probability.sum(axis=1))
 
     def quantiles(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
         """Quantiles of the bead restitution, marginalised over the walls."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from nanorocks_ros.inference.contacts.contact_terms import NO_SLOWING
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
 from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
+from nanorocks_ros.inference.speed_dependence import SpeedDependence
 from nanorocks_ros.records import (
     UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
@@ -34,12 +36,15 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
     from nanorocks_ros.settings import PriorSettings
 
+NO_DEPENDENCE = SpeedDependence()
+"""Of restitutions that are not compared at different speeds."""
+
 # Where contacts are believed alone walls rub: the prior of their friction, whose error is that of
 # walls that hardly do, is wider by this. By default 0.03 is then half as likely as 0.
 _WIDER = 10.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class RestitutionSources:
     """What decay and contacts say about both restitutions, alone and together.
 
@@ -52,6 +57,9 @@ class RestitutionSources:
     headline : Headline
     drag : Measured, [1/s]
         With friction beside it where contacts are believed alone.
+    dependence : SpeedDependence
+        Where contacts show laws of the impact speed, these are the restitutions of the headline,
+        weighted by energy; where they need not, that of the beads has its share.
     """
 
     joint: Posterior
@@ -61,6 +69,7 @@ class RestitutionSources:
     wall_friction: Measured
     headline: Headline
     drag: Measured
+    dependence: SpeedDependence
 
     def contact_intervals(self, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:
         """Of beads and walls by contacts alone; unknown without contacts of the kind."""
@@ -75,17 +84,44 @@ class RestitutionSources:
             Probabilities of lower end, value and upper end.
         """
         if self.headline is Headline.CONTACTS:
-            return self.contact_intervals(ends)
-        return intervals_of(self.joint, ends)
+            beads, walls = self.contact_intervals(ends)
+        else:
+            beads, walls = intervals_of(self.joint, ends)
+        by_law, walls_by_law = self._laws
+        return (
+            beads if by_law is None else _interval(by_law, ends),
+            walls if walls_by_law is None else _interval(walls_by_law, ends),
+        )
 
     @property
     def means(self) -> tuple[Measured, Measured]:
         """Mean and standard deviation of beads and walls by the source of the headline."""
         if self.headline is Headline.CONTACTS:
-            return _mean(self.beads), _mean(self.walls)
-        errors = np.sqrt(np.diag(self.joint.covariance)).tolist()
-        beads, walls = zip(self.joint.mean, errors, strict=True)
-        return Measured(*beads), Measured(*walls)
+            means = _mean(self.beads), _mean(self.walls)
+        else:
+            errors = np.sqrt(np.diag(self.joint.covariance)).tolist()
+            beads, walls = zip(self.joint.mean, errors, strict=True)
+            means = Measured(*beads), Measured(*walls)
+        by_law, walls_by_law = self._laws
+        return (
+            means[0] if by_law is None else _mean(by_law),
+            means[1] if walls_by_law is None else _mean(walls_by_law),
+        )
+
+    @cached_property
+    def _laws(self) -> tuple[Posterior1D | None, Posterior1D | None]:
+        """Restitutions of beads and walls where their laws count; None where they do not."""
+        dependence, by_law, walls_by_law = self.dependence, None, None
+        if dependence.bead_law is not None and dependence.bead_weight > 0.0:
+            by_law = dependence.bead_law.energy_weighted
+            constant = self.beads
+            if self.headline is not Headline.CONTACTS:
+                constant = self.joint.beads
+            if dependence.bead_weight < 1.0 and constant is not None:
+                by_law = constant.mixed_with(by_law, dependence.bead_weight)
+        if dependence.walls is not None and dependence.wall_weight > 0.0:
+            walls_by_law = dependence.walls.law.energy_weighted
+        return by_law, walls_by_law
 
     @property
     def correlation(self) -> float:
@@ -105,6 +141,7 @@ def restitution_sources(
     *,
     decay_counts: bool = True,
     losses: FlightLosses | None = None,
+    dependence: SpeedDependence = NO_DEPENDENCE,
 ) -> RestitutionSources:
     """Restitutions by each source.
 
@@ -120,6 +157,8 @@ def restitution_sources(
     losses : FlightLosses, optional
         What slows beads between contacts, where flights were seen. By friction only where contacts
         are believed alone: that widens their intervals.
+    dependence : SpeedDependence, optional
+        Of the contacts; the decay does not count where it is seen.
 
     Raises
     ------
@@ -140,7 +179,7 @@ def restitution_sources(
     number = contacts.rebounds + contacts.collisions
     friction = contacts.wall_friction
     headline = headline_of(number, joint.tension, friction)
-    if not decay_counts:
+    if dependence.is_seen or not decay_counts:
         headline = Headline.CONTACTS
     if headline is Headline.CONTACTS:
         slowing = losses.rubbed if losses else NO_SLOWING
@@ -154,6 +193,7 @@ def restitution_sources(
         wall_friction=friction,
         headline=headline,
         drag=slowing.drag if losses else UNKNOWN_MEASURED,
+        dependence=dependence,
     )
 
 

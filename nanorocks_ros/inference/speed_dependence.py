@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.inference.flights.flight_losses import Slowing
+from nanorocks_ros.records import Interval
 from nanorocks_ros.records.headlines import walls_rub
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
     from nanorocks_ros.inference.contacts.restitution_exponent import RestitutionExponent
+    from nanorocks_ros.inference.contacts.restitution_law import RestitutionLaw
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.settings import PriorSettings
 
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 # tested, but intervals are rather too wide: at most 5 % of gases of constant restitution have a
 # smaller one in either (`python -m benchmarks speed_dependence`).
 _MAX_CHANCE = 0.05
+# Largest exponent of a law that is not certain: those of known materials are 0 to 0.6. All up to
+# it together are as likely as a constant restitution, before contacts are seen.
+_HIGHEST_EXPONENT = 0.75
 # Of the contacts of an estimate before.
 _MORE = 1.1
 
@@ -38,6 +43,31 @@ class SpeedDependence(NamedTuple):
         """Whether any kind of contacts shows a dependence; wrong in 5 % of constant gases."""
         return any(kind is not None and kind.chance < _MAX_CHANCE for kind in self)
 
+    @property
+    def bead_weight(self) -> float:
+        """Probability of the law of the beads against a constant restitution.
+
+        1 where the test rejects that; 0 without a law.
+        """
+        beads = self.beads
+        if beads is None or self.bead_law is None:
+            return 0.0
+        if beads.chance < _MAX_CHANCE:
+            return 1.0
+        return beads.law_probability(_HIGHEST_EXPONENT)
+
+    @property
+    def bead_law(self) -> RestitutionLaw | None:
+        """The law of the beads: of any exponent where it is certain, else of known materials."""
+        if self.beads is None or self.beads.chance < _MAX_CHANCE:
+            return None if self.beads is None else self.beads.law
+        return self.beads.law.up_to(_HIGHEST_EXPONENT)
+
+    @property
+    def wall_weight(self) -> float:
+        """Whether the walls follow their law, 1 or 0."""
+        return 1.0 if self.walls is not None and self.walls.chance < _MAX_CHANCE else 0.0
+
     def fields(self, ends: NDArray[np.float64]) -> dict[str, Any]:
         """The fields of `CycleRestitution` and `MeanRestitution` that say so.
 
@@ -51,6 +81,8 @@ class SpeedDependence(NamedTuple):
             if kind:
                 fields[f'{prefix}restitution_exponent'] = kind.interval(ends)
                 fields[f'{prefix}impact_speed'] = kind.speed
+                lower, value, upper = kind.law.at(kind.speed).quantiles(ends).tolist()
+                fields[f'{prefix}impact_restitution'] = Interval(value, lower, upper)
         return fields
 
 

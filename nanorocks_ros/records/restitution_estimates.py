@@ -98,6 +98,10 @@ class CorEstimate:
         their contacts; 0 where the restitution is constant.
     impact_speed, wall_impact_speed : float, [m/s]
         Geometric mean of the impact speeds of these contacts, along the normal.
+    impact_restitution, wall_impact_restitution : Interval, 0 to 1
+        Restitution at these speeds, by that power law. Where `SPEED_DEPENDENT` is set,
+        `restitution` is that which loses as much energy in the contacts that were seen; the
+        constant one is `contact_restitution`.
     """
 
     stamp_ns: int
@@ -138,3 +142,5 @@ class CorEstimate:
     wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
     impact_speed: float = UNKNOWN
     wall_impact_speed: float = UNKNOWN
+    impact_restitution: Interval = UNKNOWN_INTERVAL
+    wall_impact_restitution: Interval = UNKNOWN_INTERVAL

@@ -110,9 +110,10 @@ FLAGS = {
     Quality.SPEED_DEPENDENT: Words(
         'contacts at different speeds contradict a constant restitution, in 5 % of cycles by '
         'chance',
-        'the restitutions are those of contacts alone, near impact_speed and wall_impact_speed; '
-        'restitution_exponent and wall_restitution_exponent say how 1 - restitution goes with '
-        'speed',
+        'the restitutions are those of contacts alone, and lose as much energy in the contacts '
+        'that were seen; impact_restitution and wall_impact_restitution are those at impact_speed '
+        'and wall_impact_speed, the exponents say how 1 - restitution goes with speed, '
+        'contact_restitution is the constant one',
     ),
 }
 """Meaning and remedy of each flag."""

@@ -30,9 +30,19 @@ class SimulationSettings:
     )
     restitution_law: str = setting(
         'constant',
-        'how the restitution between beads depends on the impact speed along the normal: not at '
-        'all, as of viscoelastic spheres, or 1 - restitution as a power of it',
-        choices=('constant', 'viscoelastic', 'power'),
+        'restitution between beads: constant, drawn from a uniform distribution of '
+        '`restitution_width` (also with constant and a width), falling with the impact speed '
+        'along the normal as of viscoelastic spheres, 1 - restitution as a power of that speed, '
+        'or that of each pair of species by `restitution_pairs`',
+        choices=('constant', 'uniform', 'viscoelastic', 'power', 'pairs'),
+    )
+    restitution_pairs: tuple[float, ...] = setting(
+        (0.89,),
+        'with the law pairs: restitutions of pairs of species in the order of the tray; of '
+        'acrylic and glass: acrylic-acrylic, acrylic-glass, glass-glass; a single one is that of '
+        'all pairs',
+        low=0.0,
+        high=1.0,
     )
     wall_restitution_law: str = setting(
         'constant',
@@ -131,6 +141,17 @@ class SimulationSettings:
     noise: float = setting(
         2.0, 'standard deviation of the sensor noise', 'gray levels', low=0.0, high=64.0
     )
+
+
+LAW_SETTINGS = (
+    'restitution_law',
+    'wall_restitution_law',
+    'restitution_width',
+    'restitution_speed',
+    'restitution_exponent',
+    'restitution_pairs',
+)
+"""Settings that say how restitutions depend on speed, chance or species."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,11 +15,7 @@ from nanorocks_ros.physics.stokes_drag import stokes_rate, viscosity_of
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.input_checks import check_room
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
-from nanorocks_ros.simulation.engine.rules.restitution_laws import (
-    PowerLawRestitution,
-    UniformRestitution,
-    ViscoelasticRestitution,
-)
+from nanorocks_ros.simulation.engine.rules.restitution_laws import LAWS, SPEED_LAWS, LawTerms
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 from nanorocks_ros.simulation.packing.random_placement import random_positions
 from nanorocks_ros.simulation.velocities import maxwellian, uniform_speeds
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
 
 _SPHERE = math.pi / 6.0
 _SMOOTH = -1.0
-_CONSTANT = 'constant'
+_CONSTANT, _UNIFORM = 'constant', 'uniform'
 # Largest speed of the walls of a shaken tray, in mean speeds of the beads.
 _WALL_SPEED = 2.0
 
@@ -96,7 +92,7 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
     Raises
     ------
     SimulationError
-        For a range of restitutions outside 0 to 1.
+        For a range of restitutions outside 0 to 1, or a table of pairs of other species.
     """
     tangential: tuple[float | None, float | None] = (
         settings.tangential_restitution,
@@ -106,7 +102,7 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
         tangential = None, None
     return CollisionRules(
         box=tray.dimensions,
-        restitution=_beads(settings),
+        restitution=_beads(settings, tray),
         wall_restitution=_walls(settings),
         sticking_speed=settings.sticking_speed,
         wall_sticking_speed=settings.wall_sticking_speed,
@@ -120,26 +116,24 @@ def rules_of(settings: SimulationSettings, tray: Tray, run: int = 0) -> Collisio
     )
 
 
-def _beads(settings: SimulationSettings) -> Restitution:
+def _beads(settings: SimulationSettings, tray: Tray) -> Restitution | NDArray[np.float64]:
     """Restitution of two beads.
 
     Raises
     ------
     SimulationError
-        For one that is drawn at random and depends on speed as well.
+        For a width with a law that has none, or a table of other species.
     """
-    constant = settings.restitution_law == _CONSTANT
-    if settings.restitution_width == 0.0:
-        value = settings.restitution
-        return value if constant else _speed_law(settings.restitution_law, value, settings)
-    if not constant:
+    name = settings.restitution_law
+    if settings.restitution_width > 0.0 and name == _CONSTANT:
+        name = _UNIFORM
+    elif settings.restitution_width > 0.0 and name != _UNIFORM:
         raise SimulationError(
             'restitution_law',
-            f'{settings.restitution_law!r} with a restitution_width of '
-            f'{settings.restitution_width:g}',
+            f'{name!r} with a restitution_width of {settings.restitution_width:g}',
             'set one of them',
         )
-    return UniformRestitution(mean=settings.restitution, width=settings.restitution_width)
+    return LAWS[name](_terms(settings, settings.restitution, len(tray.species)))
 
 
 def _walls(settings: SimulationSettings) -> Sequence[float] | Sequence[SpeedLaw]:
@@ -149,15 +143,18 @@ def _walls(settings: SimulationSettings) -> Sequence[float] | Sequence[SpeedLaw]
     values = (side, side, side, side, ends, ends)
     if settings.wall_restitution_law == _CONSTANT:
         return values
-    return [_speed_law(settings.wall_restitution_law, value, settings) for value in values]
+    law = SPEED_LAWS[settings.wall_restitution_law]
+    return [law(_terms(settings, value)) for value in values]
 
 
-def _speed_law(name: str, value: float, settings: SimulationSettings) -> SpeedLaw:
-    at_speed = settings.restitution_speed
-    if name == 'viscoelastic':
-        return ViscoelasticRestitution(value=value, at_speed=at_speed)
-    return PowerLawRestitution(
-        value=value, at_speed=at_speed, exponent=settings.restitution_exponent
+def _terms(settings: SimulationSettings, value: float, species: int = 1) -> LawTerms:
+    return LawTerms(
+        value=value,
+        width=settings.restitution_width,
+        at_speed=settings.restitution_speed,
+        exponent=settings.restitution_exponent,
+        pairs=settings.restitution_pairs,
+        species=species,
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.special import logsumexp
 
-from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
 
 NODES = np.linspace(0.78, 1.0, 221)
 
@@ -54,3 +56,17 @@ def test_a_shift_moves_the_likelihood_up():
     moved = gaussian(0.9, 0.01).shifted(0.02).posterior((0.78, 1.0))
     assert moved.mean == pytest.approx(0.92, abs=1e-5)
     assert gaussian(0.9, 0.01).shifted(0.0).posterior((0.78, 1.0)).mean == pytest.approx(0.9)
+
+
+def test_a_mixture_has_the_mean_and_the_quantiles_of_both():
+    axis = np.linspace(0.0, 1.0, 2001)
+    first, second = (
+        Posterior1D(restitution=axis, probability=weight / weight.sum())
+        for weight in (np.exp(-0.5 * ((axis - mean) / 0.02) ** 2) for mean in (0.4, 0.8))
+    )
+    mixture = first.mixed_with(second, 0.25)
+    assert mixture.mean == pytest.approx(0.5, abs=1e-3)
+    assert mixture.deviation == pytest.approx(math.hypot(0.02, 0.4 * math.sqrt(0.1875)), rel=0.01)
+    assert mixture.quantiles(np.array([0.375, 0.875])) == pytest.approx([0.4, 0.8], abs=2e-3)
+    assert first.mixed_with(second, 0.0).mean == pytest.approx(0.4, abs=1e-3)
+    assert mixture.probability.sum() == pytest.approx(1.0)

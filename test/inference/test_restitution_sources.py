@@ -9,6 +9,7 @@ from operator import add
 
 import numpy as np
 import pytest
+from contact_draws import drawn_rebound
 from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.experiment.trays import load_trays
@@ -17,8 +18,10 @@ from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
+from nanorocks_ros.inference.likelihood_1d import Posterior1D
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.inference.restitution_sources import restitution_sources
+from nanorocks_ros.inference.speed_dependence import SpeedDependence
 from nanorocks_ros.records import Headline, Measured, Quality, headline_in_words, headline_of
 from nanorocks_ros.settings import PriorSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
@@ -106,6 +109,61 @@ def test_a_decay_that_does_not_count_leaves_the_contacts(tables):
     nothing = np.zeros(tables.mean.shape[0])
     sources = restitution_sources(tables, nothing, rebounds(0.97), PRIOR, decay_counts=False)
     assert sources.headline is Headline.CONTACTS
+
+
+def law():
+    """The law of contacts with an exponent of 0.5 and 0.8 at 3 mm/s."""
+    rng = np.random.default_rng(2)
+    speeds = np.exp(rng.uniform(np.log(1e-3), np.log(1e-2), 120))
+    return ContactTerms.of(
+        drawn_rebound(speed, speed * (1.0 - 0.2 * (speed / 3e-3) ** 0.5), 0.02 * speed)
+        for speed in speeds
+    ).wall_exponent()
+
+
+def test_a_law_of_the_impact_speed_is_the_headline_weighted_by_energy(tables):
+    beads = law()
+    sources = restitution_sources(
+        tables,
+        decay(tables, 0.89, 0.97),
+        rebounds(0.97),
+        PRIOR,
+        dependence=SpeedDependence(beads=beads),
+    )
+    assert sources.headline is Headline.CONTACTS
+    interval = sources.intervals(ENDS)[0]
+    assert [interval.lower, interval.value, interval.upper] == pytest.approx(
+        beads.law.energy_weighted.quantiles(ENDS)
+    )
+    assert sources.means[0].value == pytest.approx(beads.law.energy_weighted.mean)
+    # The constant one is beside it, unknown without collisions.
+    assert math.isnan(sources.contact_intervals(ENDS)[0].value)
+
+
+def test_a_law_that_is_not_certain_has_its_share_of_the_headline(tables):
+    arguments = tables, decay(tables, 0.89, 0.97), rebounds(0.97), PRIOR
+    constant = restitution_sources(*arguments)
+    hint = SpeedDependence(beads=wide(law()))
+    shared = restitution_sources(*arguments, dependence=hint)
+    assert shared.headline is Headline.JOINT
+    weight = hint.bead_weight
+    assert 0.0 < weight < 1.0
+    by_law = hint.bead_law.energy_weighted.mean
+    assert shared.means[0].value == pytest.approx(
+        (1.0 - weight) * constant.means[0].value + weight * by_law, abs=1e-3
+    )
+    assert shared.means[0].error > constant.means[0].error
+    assert shared.means[1] == constant.means[1]
+    assert shared.intervals(ENDS)[1] == constant.intervals(ENDS)[1]
+
+
+def wide(exponent):
+    """The same with an exponent that may well be 0."""
+    axis = np.linspace(-1.0, 2.0, 3001)
+    weight = np.exp(-0.5 * ((axis - 0.3) / 0.2) ** 2)
+    return replace(
+        exponent, exponent=Posterior1D(restitution=axis, probability=weight / weight.sum())
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,12 @@ from small_gases import acrylic, smallest_gap, tray_of
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
-from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.settings import SimulationSettings, rows
 from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    LAWS,
+    SPEED_LAWS,
     PowerLawRestitution,
+    UniformRestitution,
     ViscoelasticRestitution,
 )
 from nanorocks_ros.simulation.initial_state import inventory, resting_beads, rules_of
@@ -142,4 +145,29 @@ def test_restitutions_that_depend_on_speed_are_told_by_settings():
 def test_a_restitution_drawn_at_random_cannot_depend_on_speed_as_well():
     settings = SimulationSettings(restitution_width=0.1, restitution_law='power')
     with pytest.raises(SimulationError, match=r"restitution_law: 'power' with .* of 0\.1"):
+        rules_of(settings, load_trays()[1])
+
+
+def test_the_settings_name_the_laws_of_the_register():
+    choices = {row.name: row.bounds.choices for row in rows(SETTINGS)}
+    assert choices['restitution_law'] == tuple(LAWS)
+    assert choices['wall_restitution_law'] == ('constant', *SPEED_LAWS)
+
+
+@pytest.mark.parametrize('law', ['constant', 'uniform'])
+def test_a_uniform_restitution_is_told_by_its_name_or_its_width(law):
+    settings = SimulationSettings(restitution=0.8, restitution_width=0.2, restitution_law=law)
+    rules = rules_of(settings, load_trays()[1])
+    assert rules.restitution == UniformRestitution(mean=0.8, width=0.2)
+
+
+def test_restitutions_of_pairs_of_species_are_in_the_order_of_the_tray():
+    settings = SimulationSettings(restitution_law='pairs', restitution_pairs=(0.9, 0.8, 0.7))
+    rules = rules_of(settings, load_trays()[3])
+    np.testing.assert_array_equal(rules.restitution, [[0.9, 0.8], [0.8, 0.7]])
+    for_all = replace(settings, restitution_pairs=(0.6,))
+    np.testing.assert_array_equal(
+        rules_of(for_all, load_trays()[3]).restitution, np.full((2, 2), 0.6)
+    )
+    with pytest.raises(SimulationError, match='restitution_pairs: 3 restitutions for 1 species'):
         rules_of(settings, load_trays()[1])

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
+    from nanorocks_ros.cli.flags import add_flags
+    from nanorocks_ros.settings import SimulationSettings, rows
+    from nanorocks_ros.settings.simulation_settings import LAW_SETTINGS
+
     parser = commands.add_parser(
         'library', help='simulate the decays of a tray from which restitutions are inferred'
     )
@@ -41,6 +45,11 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument('--force', action='store_true', help='replace a file that exists')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
+    settings = SimulationSettings()
+    skipped = {row.name for row in rows(settings)} - set(LAW_SETTINGS)
+    add_flags(
+        parser, settings, skipped, 'laws that are not constant; `analyse` needs constant ones'
+    )
     parser.set_defaults(run=run)
 
 
@@ -50,7 +59,8 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
+    from nanorocks_ros.studies.libraries.decay_simulations import build_library
+    from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan
 
     output = Path(options.output)
     check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
@@ -61,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
         runs=options.runs,
         seed=options.seed,
         drag=options.drag,
+        law=_law(options),
     )
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     with Progress(f'decays of tray {options.tray}') as progress:
@@ -77,3 +88,19 @@ def run(options: argparse.Namespace) -> int:
     else:
         print(f'{output}: misfit {100.0 * library.misfit:.1f} % beyond the noise of its runs')
     return 0
+
+
+def _law(options: argparse.Namespace) -> dict[str, Any]:
+    """The settings of the law, checked; empty for constant restitutions."""
+    import argparse
+
+    from nanorocks_ros.cli.flags import settings_from
+    from nanorocks_ros.settings import SimulationSettings
+    from nanorocks_ros.settings.simulation_settings import LAW_SETTINGS
+
+    default = SimulationSettings()
+    # Other options have names of settings, too.
+    of_law = argparse.Namespace(**{name: getattr(options, name) for name in LAW_SETTINGS})
+    given = settings_from(of_law, default)
+    law = {name: getattr(given, name) for name in LAW_SETTINGS}
+    return law if any(law[name] != getattr(default, name) for name in law) else {}

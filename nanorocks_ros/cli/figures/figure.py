@@ -14,6 +14,7 @@ MODULES = (
     'figure_dust',
     'figure_long_term',
     'figure_decay',
+    'figure_impacts',
 )
 """Modules of `nanorocks_ros.cli.figures` that add a kind, in the order of the help."""
 

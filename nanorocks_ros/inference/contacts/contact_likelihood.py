@@ -36,6 +36,9 @@ VERTICAL_RATIOS = (0.25, 0.4, 0.6, 0.9, 1.3)
 RADIUS_ERRORS = (-0.02, 0.0, 0.02, 0.04, 0.06)
 """Glass beads of 12 px came out 4 % too large in films with all effects."""
 
+MIDDLE_NUISANCE = len(RADIUS_ERRORS) * (len(VERTICAL_RATIOS) // 2) + len(RADIUS_ERRORS) // 2
+"""Row of `pair_table` with the middle ones of both."""
+
 ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
 """Factors by which the true errors of rebounds may exceed the stated ones. Not below 1: many slow
 rebounds, whose stated errors are too large, would then give the few fast ones too much weight."""

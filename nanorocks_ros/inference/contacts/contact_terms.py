@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import (
     ERROR_SCALES,
+    MIDDLE_NUISANCE,
     marginal,
     pair_table,
     rebound_table,
 )
 from nanorocks_ros.inference.contacts.dragged_contacts import loss_beside_contacts, loss_sums
+from nanorocks_ros.inference.contacts.impact_bins import speed_bins
+from nanorocks_ros.inference.contacts.impact_likelihoods import CollisionImpacts, ReboundImpacts
 from nanorocks_ros.inference.contacts.impact_tables import collision_impacts, rebound_impacts
 from nanorocks_ros.inference.contacts.restitution_exponent import bead_exponent, wall_exponent
 from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.inference.contacts.impact_bins import SpeedBin
     from nanorocks_ros.inference.contacts.restitution_exponent import RestitutionExponent
 
 _LOWEST_REBOUND = 0.5
@@ -176,14 +180,49 @@ class ContactTerms:
         slowing : Slowing, optional
             What slows beads between contacts.
         """
-        scale = ERROR_SCALES[int(np.argmax(self.walls.max(axis=1)))]
-        return wall_exponent(self.rebound_impacts, scale, slowing, bias)
+        return wall_exponent(self.rebound_impacts, self._error_scale, slowing, bias)
 
     def bead_exponent(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
     ) -> RestitutionExponent | None:
-        """How the bead restitution depends on speed, as `wall_exponent`."""
-        return bead_exponent(self.collision_impacts, slowing, bias)
+        """How the bead restitution depends on speed, as `wall_exponent`.
+
+        Radii and vertical speeds, which the exponent takes for known, correct its law as much as
+        they do a constant restitution.
+        """
+        exponent = bead_exponent(self.collision_impacts, slowing, bias)
+        if exponent is None:
+            return None
+        return replace(exponent, law=exponent.law.corrected(*self._bead_correction))
+
+    def wall_bins(
+        self, ends: NDArray[np.float64], slowing: Slowing = NO_SLOWING
+    ) -> tuple[SpeedBin, ...]:
+        """Wall restitution in ranges of the impact speed, see `speed_bins`."""
+        impacts = ReboundImpacts(self.rebound_impacts, self._error_scale)
+        return speed_bins(impacts, slowing, ends)
+
+    def bead_bins(
+        self, ends: NDArray[np.float64], slowing: Slowing = NO_SLOWING
+    ) -> tuple[SpeedBin, ...]:
+        """Bead restitution in ranges of the impact speed, see `speed_bins`."""
+        impacts = CollisionImpacts(self.collision_impacts)
+        return speed_bins(impacts, slowing, ends, self._bead_correction[0])
+
+    @property
+    def _error_scale(self) -> float:
+        """Most likely factor on the errors of rebounds."""
+        return ERROR_SCALES[int(np.argmax(self.walls.max(axis=1)))]
+
+    @property
+    def _bead_correction(self) -> tuple[float, float]:
+        """What radii and vertical speeds change: a factor on the losses, and a spread."""
+        known, unknown = (
+            Likelihood1D(restitution=_BEADS, log_likelihood=logs).posterior((0.0, 1.0))
+            for logs in (self.beads[MIDDLE_NUISANCE], marginal(self.beads))
+        )
+        spread = math.sqrt(max(unknown.deviation**2 - known.deviation**2, 0.0))
+        return (1.0 - unknown.mean) / (1.0 - known.mean), spread
 
 
 def _slowed(term: Likelihood1D, loss: Measured, bias: float) -> Likelihood1D:

@@ -19,13 +19,15 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.inference.decay.friction_terms import friction_terms
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -236,22 +238,22 @@ def count_step(tray: Tray) -> int:
     return max(1, round(0.05 * max(species.count for species in tray.species)))
 
 
-def tray_key(tray: Tray, drag: float = 0.0) -> str:
-    """Properties that determine the cooling of a tray, as a JSON object: inside, beads and gas.
+def tray_key(tray: Tray, conditions: Mapping[str, Any] | None = None) -> str:
+    """Properties that determine the cooling of a tray, as a JSON object.
 
     Parameters
     ----------
     tray : Tray
-    drag : float, [1/s]
-        See `SimulationSettings`; part of the key where it is above 0.
+    conditions : mapping, optional
+        What else is not as assumed of measured decays: ``drag``, [1/s], of a gas; ``law``,
+        settings of a restitution that is not constant.
     """
     species = [
         {'diameter_low': beads.diameter_low, 'diameter_high': beads.diameter_high}
         | {'density': beads.density, 'count': beads.count}
         for beads in tray.species
     ]
-    gas = {'drag': drag} if drag > 0.0 else {}
-    return json.dumps({'dimensions': tray.dimensions, 'species': species, **gas})
+    return json.dumps({'dimensions': tray.dimensions, 'species': species, **(conditions or {})})
 
 
 def term_count() -> int:

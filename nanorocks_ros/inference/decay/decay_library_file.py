@@ -60,11 +60,20 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
     Raises
     ------
     ConfigurationError
-        When it cannot be read, or was made for another tray or with drag.
+        When it cannot be read, or was made for another tray, with drag or with a restitution that
+        is not constant.
     """
     library = load_library(str(path) or f'libraries/tray_{tray.number}.npz', packaged=not path)
     where = str(path) or f'tray {tray.number}'
-    if drag := json.loads(library.tray).get('drag'):
+    made_for = json.loads(library.tray)
+    if law := made_for.get('law'):
+        raise ConfigurationError(
+            where,
+            'the decay library is of other than constant restitutions, with the laws '
+            f'{law["restitution_law"]} (beads) and {law["wall_restitution_law"]} (walls)',
+            f'make one without a law: {build_command(tray)}',
+        )
+    if drag := made_for.get('drag'):
         raise ConfigurationError(
             where,
             f'the decay library is of a gas with a drag of {drag:g} 1/s; decays are compared with '

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from nanorocks_ros.inference.decay.friction_terms import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -82,7 +84,11 @@ def distances() -> NDArray[np.float64]:
 
 
 def fit_library(
-    tray: Tray, decays: Decays, made_by: str, drag: float = 0.0, rough: Decays | None = None
+    tray: Tray,
+    decays: Decays,
+    made_by: str,
+    conditions: Mapping[str, Any] | None = None,
+    rough: Decays | None = None,
 ) -> DecayLibrary:
     """Fit a library to decays.
 
@@ -93,8 +99,8 @@ def fit_library(
         Of smooth beads.
     made_by : str
         JSON, stored in the library.
-    drag : float, [1/s]
-        Of the gas in which the beads were simulated.
+    conditions : mapping, optional
+        As of `tray_key`.
     rough : Decays, optional
         Of beads that rub.
 
@@ -140,7 +146,7 @@ def fit_library(
         residual = target - matrix @ coefficients[:, k]
         excess += float(np.mean(residual**2) - np.mean(error[:, k] ** 2) * (1.0 - terms / nodes))
     library = DecayLibrary(
-        tray=tray_key(tray, drag),
+        tray=tray_key(tray, conditions),
         made_by=made_by,
         misfit=math.sqrt(max(excess / x.size, 0.0)),
         base=base,

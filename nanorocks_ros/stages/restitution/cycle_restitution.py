@@ -48,6 +48,7 @@ class CycleRestitution:
         Whether that is far from 0 and changes the speeds, so that the decay does not count.
     restitution_exponent, wall_restitution_exponent : Interval
     impact_speed, wall_impact_speed : float, [m/s]
+    impact_restitution, wall_impact_restitution : Interval
     speed_dependent : bool
         Whether an exponent is not 0, so that neither the decay nor a constant restitution holds.
     """
@@ -80,4 +81,6 @@ class CycleRestitution:
     wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
     impact_speed: float = UNKNOWN
     wall_impact_speed: float = UNKNOWN
+    impact_restitution: Interval = UNKNOWN_INTERVAL
+    wall_impact_restitution: Interval = UNKNOWN_INTERVAL
     speed_dependent: bool = False

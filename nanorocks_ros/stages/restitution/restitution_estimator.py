@@ -304,6 +304,8 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
                 wall_restitution_exponent=result.wall_restitution_exponent,
                 impact_speed=result.impact_speed,
                 wall_impact_speed=result.wall_impact_speed,
+                impact_restitution=result.impact_restitution,
+                wall_impact_restitution=result.wall_impact_restitution,
             ),
         )
 

@@ -231,8 +231,15 @@ class DecayLibraryMethod:
         integrated = likelihood.integrated(friction)
         accelerated = losses.is_accelerated and self._drives(losses, decay)
         dependence = self._dependence.of(terms, losses, self._prior, final=final)
-        decays = 0 if accelerated or dependence.is_seen else 1
-        sources = self._sources(integrated, terms, losses, decays=decays)
+        sources = restitution_sources(
+            self._tables,
+            integrated,
+            terms,
+            self._prior,
+            decay_counts=not accelerated,
+            losses=losses,
+            dependence=dependence,
+        )
         best = int(np.argmax(integrated))
         result = replace(
             self._speeds(decay, final=final),
@@ -258,7 +265,7 @@ class DecayLibraryMethod:
             # Rebounds determine the walls even where nothing is known of the beads.
             result = replace(result, wall_restitution=wall_restitution)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
-        trusted = trusted and decays > 0
+        trusted = trusted and not (accelerated or dependence.is_seen)
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=terms, flights=flights)
         mean, wall_mean = self._means(own, final=final, trusted=trusted)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
@@ -271,18 +278,6 @@ class DecayLibraryMethod:
         """Whether beads that fall across the tray gain more than a small part of their energy."""
         work = float(np.hypot(*losses.acceleration)) * max(self._tray.dimensions[:2])
         return work > _MAX_WORK * float(np.mean(decay.speed**2))
-
-    def _sources(
-        self,
-        integrated: NDArray[np.float64],
-        contacts: ContactTerms,
-        losses: FlightLosses,
-        *,
-        decays: int,
-    ) -> RestitutionSources:
-        return restitution_sources(
-            self._tables, integrated, contacts, self._prior, decay_counts=decays > 0, losses=losses
-        )
 
     def _means(
         self, own: CycleLikelihoods, *, final: bool, trusted: bool
@@ -323,8 +318,15 @@ class DecayLibraryMethod:
         losses = flight_losses(evidence.flights, self._drag_prior)
         friction = friction_weights(self._prior, contacts)
         dependence = speed_dependence(contacts, losses, self._prior)
-        decays = 0 if dependence.is_seen else decays
-        sources = self._sources(decay.integrated(friction), contacts, losses, decays=decays)
+        sources = restitution_sources(
+            self._tables,
+            decay.integrated(friction),
+            contacts,
+            self._prior,
+            decay_counts=decays > 0,
+            losses=losses,
+            dependence=dependence,
+        )
         intervals, means = sources.intervals(self._ends), sources.means
         restitution, wall_restitution = (
             MeasuredInterval(mean.value, mean.error, interval.lower, interval.upper)

@@ -220,21 +220,41 @@ def _source_lines(cor: CorEstimate) -> list[str]:
 
 def _exponent_lines(cor: CorEstimate) -> list[str]:
     """How the restitutions go with the impact speed; nothing where contacts do not tell it."""
-    parts = [
-        f'{name} {_interval(exponent, 2)} at {_MM * speed:.2f} mm/s'
-        for name, exponent, speed in (
-            ('beads', cor.restitution_exponent, cor.impact_speed),
-            ('walls', cor.wall_restitution_exponent, cor.wall_impact_speed),
+    kinds = [
+        (name, exponent, restitution, speed)
+        for name, exponent, restitution, speed in (
+            ('beads', cor.restitution_exponent, cor.impact_restitution, cor.impact_speed),
+            (
+                'walls',
+                cor.wall_restitution_exponent,
+                cor.wall_impact_restitution,
+                cor.wall_impact_speed,
+            ),
         )
         if math.isfinite(exponent.value)
     ]
-    if not parts:
+    if not kinds:
         return []
-    seen = 'seems to depend' if Quality.SPEED_DEPENDENT in cor.quality else 'need not depend'
-    return [
-        f'  restitution {seen} on the impact speed; exponent of 1 - restitution: '
-        f'{", ".join(parts)}'
+    seen = Quality.SPEED_DEPENDENT in cor.quality
+    parts = [
+        f'{name} {_interval(exponent, 2)} at {_MM * speed:.2f} mm/s'
+        for name, exponent, _, speed in kinds
     ]
+    lines = [
+        f'  restitution {"seems to depend" if seen else "need not depend"} on the impact speed; '
+        f'exponent of 1 - restitution: {", ".join(parts)}'
+    ]
+    if seen:
+        at_speeds = ', '.join(
+            f'{name} {_interval(restitution, 3)}' for name, _, restitution, _ in kinds
+        )
+        lines.append(
+            f'  by that law, at these speeds: {at_speeds}; the COR above loses as much energy in '
+            'the contacts that were seen'
+        )
+    elif cor.headline is Headline.JOINT and cor.restitution != cor.joint_restitution:
+        lines.append('  the interval of the beads allows for such a law, as the contacts do')
+    return lines
 
 
 def _flight_lines(cor: CorEstimate) -> list[str]:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 BAG_NAME = 'results_bag'
 # Beside the tables in a batch.
-SUMMARY, EVIDENCE = 'bag.json', 'evidence.npz'
+SUMMARY, EVIDENCE, STATISTICS = 'bag.json', 'evidence.npz', 'statistics.json'
 
 FORMATS = ('csv', 'parquet')
 """Forms of the tables of results; the first unless another is asked for."""
@@ -139,8 +139,8 @@ def _keep_others(folder: Path, fresh: Path) -> None:
     # Files of an earlier analysis, also of a batch, do not belong to the new results.
     table_names = '|'.join(product.name for product in MEASURED)
     tables = rf'tray_\d+_({table_names})\.({"|".join(FORMATS)})'
-    names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE))
-    ours = re.compile('|'.join([tables, *names]))
+    names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE, STATISTICS))
+    ours = re.compile('|'.join([tables, r'tray_\d+_statistics\.png', *names]))
     for path in folder.iterdir():
         if ours.fullmatch(path.name) or (fresh / path.name).exists():
             continue

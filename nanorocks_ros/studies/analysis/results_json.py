@@ -43,7 +43,7 @@ BY_SOURCE = tuple(
 _EXPONENTS = tuple(
     field.name
     for field in layout(CorEstimate).fields
-    if '_exponent' in field.name or field.name.endswith('impact_speed')
+    if '_exponent' in field.name or 'impact_' in field.name
 )
 _RESTITUTIONS = (
     *('initial_speed', 'initial_speed_error', 'haff_time', 'haff_time_error'),

@@ -50,6 +50,8 @@ class BatchPlan:
     told : frozenset of str or None
         Names of the settings that hold for all recordings; what a recording says of its trays
         replaces the others. None: all of them hold.
+    statistics : bool
+        Whether to measure the statistics of the gas, too.
     """
 
     bags: FoundBags
@@ -57,6 +59,7 @@ class BatchPlan:
     settings: PipelineSettings
     image_topic: str = ''
     told: frozenset[str] | None = None
+    statistics: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,7 +184,9 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
     if plan.told is None or 'trays' in plan.told or 'trays_file' not in plan.told:
         Pipeline(plan.settings, 'settings')
     workers.check()
-    with BatchStore(plan.folder, plan.settings, plan.image_topic, plan.told) as store:
+    with BatchStore(
+        plan.folder, plan.settings, plan.image_topic, plan.told, statistics=plan.statistics
+    ) as store:
         tasks = store.add(plan.bags.bags)
         for text in store.notices:
             watcher.notice(text)

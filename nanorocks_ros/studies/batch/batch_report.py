@@ -18,6 +18,7 @@ from nanorocks_ros.records import AGREEMENT_TENSION
 from nanorocks_ros.settings import PipelineSettings, priors_in_words, rows
 from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 from nanorocks_ros.studies.batch.batch_figure import decays_figure
+from nanorocks_ros.studies.batch.batch_statistics import statistics_section
 from nanorocks_ros.studies.batch.campaign_means import means_as_json
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.batch.campaign_means import Combined, CycleRow, TrayMeans
 
 _MM = 1e3
+# Place of a section after restitutions, clusters and figures.
+_AFTER_FIGURES = 3
 _SHORTEST_DAY = 86_400 * 365
 
 
@@ -68,6 +71,9 @@ def write_batch_report(
                 *_cycles(together),
                 _recordings(batch, settings),
             ]
+            gas = statistics_section({result.name: result.folder for result in batch.counted})
+            if gas is not None:
+                sections.insert(_AFTER_FIGURES, gas)
             if batch.failed:
                 sections.insert(0, _failures(batch))
             write_report(path, 'NanoRocks, all recordings', summary, sections)

@@ -72,6 +72,8 @@ class BatchStore:
     image_topic : str
     told : frozenset of str or None
         As in `BagTask`.
+    statistics : bool
+        As in `BagTask`.
 
     Attributes
     ----------
@@ -89,11 +91,16 @@ class BatchStore:
         settings: PipelineSettings,
         image_topic: str,
         told: frozenset[str] | None = None,
+        *,
+        statistics: bool = False,
     ) -> None:
         self.folder = folder.absolute()
         self.notices: list[str] = []
         self._settings, self._image_topic, self._told = settings, image_topic, told
+        self._statistics = statistics
         self._question = _question(settings, image_topic, told)
+        if statistics:
+            self._question += '-statistics'
         self.entries: dict[Path, Entry] = {}
         self._by_task: dict[str, Entry] = {}
         self._check_place()
@@ -174,6 +181,7 @@ class BatchStore:
                 note=self.folder / _NOTES / name,
                 earlier=() if before else self._gone(path),
                 told=self._told,
+                statistics=self._statistics,
             )
             self._by_task[name] = entry
         return tasks

@@ -21,6 +21,7 @@ from nanorocks_ros.experiment.recorded_experiment import (
     metadata_of_settings,
     recorded_settings,
 )
+from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
@@ -31,6 +32,7 @@ from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleS
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
 from nanorocks_ros.studies.analysis.results_folder import EVIDENCE, SUMMARY, write_results
 from nanorocks_ros.studies.analysis.results_json import as_json
+from nanorocks_ros.studies.batch.batch_statistics import TrackCollector, write_statistics
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +62,8 @@ class BagTask:
     told : frozenset of str or None
         Names of the settings that hold for all recordings; a recording that says what it shows
         replaces the others. None: all of them hold.
+    statistics : bool
+        Whether to measure the statistics of the gas, too.
     question : str
         Hash of all else that results depend on.
     note : Path
@@ -76,6 +80,7 @@ class BagTask:
     note: Path
     earlier: tuple[Path, ...] = ()
     told: frozenset[str] | None = None
+    statistics: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,12 +201,14 @@ def _analysed(task: BagTask) -> BagOutcome:
             other = '' if folder == task.folder else folder.name
             return replace(_outcome(stored, files), folder=other)
     settings, notices, _ = _settings_of(task)
+    collector = TrackCollector() if task.statistics else None
     analysis = analyse(
         task.path,
         settings,
         image_topic=task.image_topic,
         progress=_noting(task.note),
         scratch=task.folder.parent,
+        observer=collector,
     )
     analysis.notices += notices
     if file_states(task.path) != files:
@@ -222,6 +229,10 @@ def _analysed(task: BagTask) -> BagOutcome:
         for number, tray in summary['trays'].items():
             tray['by_cycle'] = _cycles(folder, int(number))
         write_archive(folder / EVIDENCE, _evidence(analysis))
+        if collector is not None:
+            last = {number: tray.cors[-1] for number, tray in analysis.trays.items() if tray.cors}
+            trays = load_trays(settings.trays_file or None)
+            write_statistics(folder, collector, trays, settings, last)
         write_bytes(folder / SUMMARY, json.dumps(summary, allow_nan=False).encode())
 
     write_results(analysis, task.folder, task.path, settings, more=more)

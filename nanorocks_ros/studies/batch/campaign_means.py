@@ -353,15 +353,15 @@ def _exponents_as_json(mean: MeanRestitution | None) -> dict[str, float | None]:
     """How the restitutions depend on the impact speed."""
     values: dict[str, float | None] = {}
     for prefix in ('', 'wall_'):
-        name = f'{prefix}restitution_exponent'
-        exponent = getattr(mean, name) if mean else UNKNOWN_INTERVAL
         speed = getattr(mean, f'{prefix}impact_speed') if mean else math.nan
-        values |= {
-            name: finite_or_none(exponent.value),
-            f'{name}_lower': finite_or_none(exponent.lower),
-            f'{name}_upper': finite_or_none(exponent.upper),
-            f'{prefix}impact_speed': finite_or_none(speed),
-        }
+        values[f'{prefix}impact_speed'] = finite_or_none(speed)
+        for name in (f'{prefix}restitution_exponent', f'{prefix}impact_restitution'):
+            interval = getattr(mean, name) if mean else UNKNOWN_INTERVAL
+            values |= {
+                name: finite_or_none(interval.value),
+                f'{name}_lower': finite_or_none(interval.lower),
+                f'{name}_upper': finite_or_none(interval.upper),
+            }
     return values
 
 

@@ -63,6 +63,8 @@ class TheoryRates(NamedTuple):
         With other beads.
     relaxation : float, [1/m]
         By which its projected velocity falls.
+    wall_hits : float, [1/m]
+        With the four side walls.
     speed_ratio : float
         Mean speed in space over the projected one.
     relative_error : float
@@ -71,6 +73,7 @@ class TheoryRates(NamedTuple):
 
     collisions: float
     relaxation: float
+    wall_hits: float
     speed_ratio: float
     relative_error: float
 
@@ -115,7 +118,8 @@ def theory_rates(
         As `ConfinedGas.cooling`.
     """
     temperature = gas.cooling(restitution, wall_restitution).granular_temperature
-    collisions = gas.collision_rates(temperature)[0].sum(axis=1)
+    pairs, walls = gas.collision_rates(temperature)
+    collisions, sides = pairs.sum(axis=1), walls[:, :2].sum(axis=1)
     relaxation = gas.velocity_relaxation(temperature, restitution)[:, :2]
     squares, counts, species = temperature[:, :2], gas.beads.counts, gas.beads.species
     speeds = gas.species_speeds(temperature)
@@ -128,6 +132,7 @@ def theory_rates(
             TheoryRates(
                 collisions=float(counts[own] @ collisions[own] / counts[own].sum()) / speed,
                 relaxation=float((weights * relaxation[own]).sum() / weights.sum()) / speed,
+                wall_hits=float(counts[own] @ sides[own] / counts[own].sum()) / speed,
                 speed_ratio=float(in_space) / speed,
                 relative_error=_MODEL_ERROR * (1.0 - restitution),
             )

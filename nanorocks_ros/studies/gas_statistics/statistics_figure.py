@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from nanorocks_ros.records import Measured
     from nanorocks_ros.studies.gas_statistics.tray_statistics import TrayStatistics
@@ -151,9 +152,40 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
             lw=1,
             label=f'theory: {_MM * rate.theory_mean_free_path:.2f} mm',
         )
+        _draw_wall_hits(axes, statistics, kind, order)
     axes.set_yscale('log')
     axes.set_xlabel('time since the shaking event [s]')
-    axes.set_ylabel('collisions of a bead with others [1/s]')
+    axes.set_ylabel('collisions of a bead [1/s]')
+
+
+def _draw_wall_hits(
+    axes: Axes, statistics: TrayStatistics, kind: int, order: NDArray[np.int64]
+) -> None:
+    """Hits of the side walls and those of theory, in the colour of the species."""
+    walls, part = statistics.wall_hits[kind], statistics.temperatures[kind]
+    if walls is None:
+        return
+    colour = _COLOURS[kind % len(_COLOURS)]
+    axes.errorbar(
+        part.time,
+        walls.per_path.value * part.mean_projected_speed,
+        yerr=walls.per_path.error * part.mean_projected_speed,
+        fmt='s',
+        ms=3,
+        lw=0.8,
+        mfc='none',
+        color=colour,
+        label=f'side walls: {walls.per_path.value / _MM:.3f} ± '
+        f'{walls.per_path.error / _MM:.3f} /mm of path',
+    )
+    axes.plot(
+        part.time[order],
+        walls.theory_per_path * part.mean_projected_speed[order],
+        '--',
+        color=colour,
+        lw=1,
+        label=f'theory: {walls.theory_per_path / _MM:.3f} /mm',
+    )
 
 
 def _pairs(axes: Axes, statistics: TrayStatistics) -> None:

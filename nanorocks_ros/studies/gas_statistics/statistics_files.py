@@ -123,6 +123,7 @@ def _measured(name: str, measured: Measured) -> dict[str, float]:
 
 def _species_values(statistics: TrayStatistics, kind: int) -> dict[str, Any]:
     shape, rate = statistics.velocities[kind], statistics.collisions[kind]
+    walls = statistics.wall_hits[kind]
     values: dict[str, Any] = {
         'material': statistics.tray.species[kind].material,
         **_measured('energy_ratio', statistics.energy_ratios[kind]),
@@ -135,10 +136,12 @@ def _species_values(statistics: TrayStatistics, kind: int) -> dict[str, Any]:
         ('velocity_relaxation', rate.relaxation if rate else unknown),
         ('collisions_per_path', rate.per_path if rate else unknown),
         ('mean_free_path', rate.mean_free_path if rate else unknown),
+        ('wall_hits_per_path', walls.per_path if walls else unknown),
     ):
         values.update(_measured(name, measured))
     values['theory_collisions_per_path'] = rate.theory_per_path if rate else None
     values['theory_mean_free_path'] = rate.theory_mean_free_path if rate else None
+    values['theory_wall_hits_per_path'] = walls.theory_per_path if walls else None
     return values
 
 

@@ -26,6 +26,7 @@ from nanorocks_ros.studies.gas_statistics.temperatures import (
 )
 from nanorocks_ros.studies.gas_statistics.velocity_distribution import velocity_distribution
 from nanorocks_ros.studies.gas_statistics.velocity_samples import sample_velocities
+from nanorocks_ros.studies.gas_statistics.wall_rates import wall_rate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.gas_statistics.temperatures import SpeciesTemperatures
     from nanorocks_ros.studies.gas_statistics.velocity_distribution import VelocityDistribution
     from nanorocks_ros.studies.gas_statistics.velocity_samples import VelocitySamples
+    from nanorocks_ros.studies.gas_statistics.wall_rates import WallRate
 
 # Time between two frames whose places are used: they hardly change within less, [s].
 _INTERVAL = 0.1
@@ -100,6 +102,8 @@ class TrayStatistics:
         Of each species; None where it was not seen.
     collisions : tuple of CollisionRate or None
         Of each species; None where it cannot be told.
+    wall_hits : tuple of WallRate or None
+        Of each species, likewise.
     pairs : tuple of PairCorrelation
     structure : StructureFactor
     clustering : tuple of Clustering
@@ -115,6 +119,7 @@ class TrayStatistics:
     energy_ratios: tuple[Measured, ...]
     velocities: tuple[VelocityDistribution | None, ...]
     collisions: tuple[CollisionRate | None, ...]
+    wall_hits: tuple[WallRate | None, ...]
     pairs: tuple[PairCorrelation, ...]
     structure: StructureFactor
     clustering: tuple[Clustering, ...]
@@ -151,7 +156,7 @@ def tray_statistics(
             f'no bead moves measurably later than {choices.start:g} s after shaking',
             'give an earlier start, or look at the tracks with nanorocks track',
         )
-    collisions, notices = _collisions(moving, samples, tray, choices)
+    collisions, wall_hits, notices = _collisions(moving, samples, tray, choices)
     frames = [_frames(cycle, samples) for cycle in moving]
     places = [place for shown, _, _ in frames for place in shown]
     block = np.concatenate([blocks for _, _, blocks in frames])
@@ -166,6 +171,7 @@ def tray_statistics(
         energy_ratios=tuple(energy_ratios(samples, tray)),
         velocities=tuple(velocity_distribution(samples, kind) for kind in kinds),
         collisions=collisions,
+        wall_hits=wall_hits,
         pairs=pair_correlations(places, block, tray, random),
         structure=structure_factor(waves, np.concatenate(powers), block, random_powers),
         clustering=tuple(
@@ -181,17 +187,21 @@ def _collisions(
     samples: VelocitySamples,
     tray: Tray,
     choices: GasChoices,
-) -> tuple[tuple[CollisionRate | None, ...], tuple[str, ...]]:
-    """Collision rates of each species, and why there are none."""
+) -> tuple[tuple[CollisionRate | None, ...], tuple[WallRate | None, ...], tuple[str, ...]]:
+    """Rates of each species, with beads and with side walls, and why there are none."""
     try:
         theory = theory_rates(confined_gas(tray), choices.restitution, choices.wall_restitution)
     except (ConfigurationError, FitError) as error:
         notice = f'tray {tray.number}: no collision rates: {error}'
-        return tuple(None for _ in tray.species), (notice,)
+        none = tuple(None for _ in tray.species)
+        return none, none, (notice,)
     rates = tuple(
         collision_rate(cycles, samples, tray, kind, rate) for kind, rate in enumerate(theory)
     )
-    return rates, ()
+    walls = tuple(
+        wall_rate(cycles, samples, tray, kind, rate.wall_hits) for kind, rate in enumerate(theory)
+    )
+    return rates, walls, ()
 
 
 def _frames(

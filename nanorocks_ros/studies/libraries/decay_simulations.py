@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.inference.decay.decay_library import NUISANCES, count_step, tray_key
+from nanorocks_ros.inference.decay.decay_library import NUISANCES
 from nanorocks_ros.inference.decay.decay_library_file import library_arrays
-from nanorocks_ros.inference.decay.friction_terms import FRICTION, TANGENTIAL
+from nanorocks_ros.inference.decay.friction_terms import FRICTION
 from nanorocks_ros.inference.decay.library_fit import (
     Decays,
-    distances,
     fewest_nodes,
     fewest_rough_nodes,
     fit_library,
@@ -25,7 +21,12 @@ from nanorocks_ros.inference.decay.library_fit import (
 from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
-from nanorocks_ros.settings import SimulationSettings, with_values
+from nanorocks_ros.simulation.initial_state import rules_of
+from nanorocks_ros.studies.libraries.library_nodes import (
+    LibraryPlan,
+    cool_node,
+    simulated_node,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,63 +34,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay.decay_library import DecayLibrary
     from nanorocks_ros.jobs.journal import Journal
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.outputs.npz_archive import Arrays
 
-# In space, [m/s]. Arbitrary without drag: then the decay is a function of speed times time alone.
-MEAN_SPEED = 0.01
-# The mean projected speed of a drawn start is within these factors of the expected one.
-_SLOWER, _FASTER = 0.3, 3.0
-_TIMES = 150
 _DECAYS = 'log_speed'
 _NODES_IN_TASK = 4
-# Rough nodes have random numbers of their own.
-_FIRST_ROUGH = 1 << 20
-# Smallest speed over the first.
-_REST = 1e-100
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LibraryPlan:
-    """Parameters of the simulations for a decay library.
-
-    Parameters
-    ----------
-    tray : Tray
-    nodes : int
-        Number of points in the space of restitutions and nuisance parameters, with smooth beads.
-    rough_nodes : int
-        Further points, with beads that rub; 0: the library knows smooth beads alone.
-    runs : int
-        Runs at each node.
-    seed : int
-    drag : float, [1/s]
-        As the setting of that name, at the mean speed of `MEAN_SPEED` at the start: what counts is
-        the drag over the speed.
-    """
-
-    tray: Tray
-    nodes: int
-    runs: int
-    rough_nodes: int = 0
-    seed: int = 1
-    drag: float = 0.0
-
-    def specification(self) -> str:
-        """Everything that the library depends on, as a JSON object."""
-        return json.dumps(
-            {
-                'version': __version__,
-                'nodes': self.nodes,
-                'rough_nodes': self.rough_nodes,
-                'runs': self.runs,
-                'seed': self.seed,
-                'tray': json.loads(tray_key(self.tray, self.drag)),
-            }
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,8 +99,8 @@ def build_library(
         raise ConfigurationError(
             '--rough-nodes', f'{plan.rough_nodes}', f'give 0, or {fewest_rough_nodes()} or more'
         )
-    # A drag out of range is refused before any work.
-    _simulated(plan, 0)
+    # A drag or a law out of range is refused before any work.
+    rules_of(*simulated_node(plan, 0))
     workers = workers or Workers()
     workers.check()
     with resumed_journal(output, plan.specification(), notice) as journal:
@@ -158,7 +109,7 @@ def build_library(
             plan.tray,
             _decays(plan, journal),
             plan.specification(),
-            plan.drag,
+            plan.conditions,
             _decays(plan, journal, rough=True) if plan.rough_nodes else None,
         )
         write_archive(output, library_arrays(library))
@@ -206,81 +157,3 @@ def cool_nodes(task: _Nodes) -> Arrays:
     """The decays of some nodes: ``log_speed`` (n_nodes, n_runs, n_x)."""
     nodes = [cool_node(task.plan, number, rough=task.rough) for number in task.numbers]
     return {_DECAYS: np.stack(nodes)}
-
-
-def cool_node(plan: LibraryPlan, number: int, *, rough: bool = False) -> NDArray[np.float64]:
-    """Decays of the runs at one node, ln f, (n_runs, n_x).
-
-    Parameters
-    ----------
-    plan : LibraryPlan
-    number : int
-        Of the node.
-    rough : bool
-        Whether it is one of the rough ones.
-
-    Raises
-    ------
-    SimulationError
-        When the beads do not fit, or a run has events without end.
-    """
-    from nanorocks_ros.simulation.ensemble import cooling_runs
-
-    x = distances()
-    times = np.geomspace(x[0] / (_FASTER * MEAN_SPEED), x[-1] / (_SLOWER * MEAN_SPEED), _TIMES)
-    settings, tray = _simulated(plan, number, rough=rough)
-    first = number + (_FIRST_ROUGH if rough else 0)
-    runs = [(first << 32) + run for run in range(plan.runs)]
-    speed = cooling_runs(settings, tray, np.concatenate(([0.0], times)), runs).mean_projected_speed
-    start = speed[:, :1]
-    # Beads that rub may come to rest, in the end of all digits.
-    speed = np.maximum(speed, _REST * start)
-    return np.array(
-        [
-            np.interp(np.log(x), np.log(times * first[0]), np.log(curve[1:] / first[0]))
-            for curve, first in zip(speed, start, strict=True)
-        ]
-    )
-
-
-def _simulated(
-    plan: LibraryPlan, number: int, *, rough: bool = False
-) -> tuple[SimulationSettings, Tray]:
-    """Settings and tray of a node."""
-    node = node_of(number, rough=rough)
-    tray = plan.tray
-    index = max(range(len(tray.species)), key=lambda k: tray.species[k].count)
-    most_frequent = tray.species[index]
-    size = 1.0 + node['diameter']
-    species = list(tray.species)
-    species[index] = replace(
-        most_frequent,
-        diameter_low=size * most_frequent.diameter_low,
-        diameter_high=size * most_frequent.diameter_high,
-        count=max(1, most_frequent.count + round(node['count']) * count_step(tray)),
-    )
-    length, width, height = tray.dimensions
-    wall, ends = node['wall_restitution'], node['floor_lid_restitution']
-    values = {
-        'seed': plan.seed,
-        'restitution': node['restitution'],
-        'wall_restitution': wall,
-        'floor_lid_difference': ends - wall,
-        'vertical_speed_factor': math.exp(node['anisotropy']),
-        'speeds': 'maxwellian' if node['start'] > 0.0 else 'uniform',
-        'mean_speed': MEAN_SPEED,
-        'drag': plan.drag,
-    }
-    if rough:
-        tangential = TANGENTIAL + node['tangential']
-        friction = node['wall_friction']
-        values |= {
-            'tangential_restitution': tangential,
-            'wall_tangential_restitution': tangential,
-            'wall_friction': friction,
-            'friction': friction * math.exp(node['bead_friction']),
-        }
-    return (
-        with_values(SimulationSettings(), values, 'decay library'),
-        replace(tray, species=tuple(species), dimensions=(length, width, height + node['height'])),
-    )

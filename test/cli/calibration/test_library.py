@@ -6,6 +6,8 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 
+PAIRS = '--restitution-law', 'pairs', '--restitution-pairs'
+
 
 @pytest.mark.parametrize(
     ('arguments', 'code', 'message'),
@@ -16,6 +18,12 @@ from nanorocks_ros.cli.main import main
         (('--tray', '1', '-o', 'a.npz', '--trays-file', 'no.yaml'), 2, 'no.yaml'),
         (('--tray', '1', '-o', 'a.npz', '--workers', '0'), 2, '--workers'),
         (('--tray', '1', '-o', 'a.npz', '--drag', '-1'), 2, 'drag'),
+        (('--tray', '1', '-o', 'a.npz', '--restitution-law', 'linear'), 2, 'none of constant'),
+        (
+            ('--tray', '1', '-o', 'a.npz', *PAIRS, '0.9', '0.8'),
+            1,
+            'restitution_pairs: 2 restitutions for 1 species',
+        ),
     ],
 )
 def test_a_wrong_call_is_one_line(tmp_path, monkeypatch, capsys, arguments, code, message):

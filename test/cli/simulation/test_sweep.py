@@ -31,6 +31,18 @@ def start(*arguments):
     )
 
 
+def test_a_law_of_the_restitution_is_an_axis_like_any_other(tmp_path, capsys):
+    laws = ['--restitution-law', 'constant,uniform,viscoelastic,power,pairs']
+    pairs = ['--restitution', '0.6', '--restitution-pairs', '0.6']
+    output = tmp_path / 'laws.npz'
+    assert main(['sweep', *SMALL, *laws, *pairs, '-o', str(output), '--json']) == 0
+    curves = json.loads(capsys.readouterr().out)['mean_speed']
+    assert len(curves) == 5
+    wrong = ['--restitution-law', 'pairs', '--restitution-pairs', '0.6', '0.7']
+    assert main(['sweep', *SMALL, *wrong, '-o', str(tmp_path / 'no.npz')]) == 1
+    assert 'restitution_pairs: 2 restitutions for 1 species' in capsys.readouterr().err
+
+
 def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
     output, table = tmp_path / 'a.npz', tmp_path / 'a.csv'
     arguments = ['sweep', *SMALL, *GRID, '-o', str(output), '--csv', str(table), '--json']

@@ -20,7 +20,7 @@ from nanorocks_ros.inference.decay.friction_terms import FRICTION
 from nanorocks_ros.inference.decay.library_fit import node_of
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, cool_node
+from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan, cool_node
 
 TRAYS = load_trays()
 

@@ -146,15 +146,21 @@ def test_how_the_restitution_goes_with_speed_is_said():
         headline=Headline.CONTACTS,
         restitution_exponent=Interval(0.55, 0.41, 0.7),
         impact_speed=1.42e-3,
+        impact_restitution=Interval(0.86, 0.84, 0.88),
     )
     text = text_of(cor)
     assert 'contacts alone, since contacts at different speeds contradict a constant' in text
     assert 'restitution seems to depend on the impact speed; exponent of 1 - restitution: ' in text
     assert 'beads 0.55 [0.41, 0.70] at 1.42 mm/s' in text
     assert 'walls' not in text.split('exponent of 1 - restitution')[1].splitlines()[0]
+    assert 'by that law, at these speeds: beads 0.860 [0.840, 0.880]; the COR above' in text
     assert 'in 5 % of cycles by chance' in text
     constant = replace(cor, quality=NOTHING_WRONG, headline=Headline.JOINT)
     assert 'need not depend' in text_of(constant)
+    assert 'by that law' not in text_of(constant)
+    assert 'allows for such a law' in text_of(constant)
+    plain = replace(constant, joint_restitution=constant.restitution)
+    assert 'allows for such a law' not in text_of(plain)
     assert 'depend' not in text_of(FINAL)
 
 

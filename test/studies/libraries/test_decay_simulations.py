@@ -9,17 +9,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError, SimulationError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library import tray_key
 from nanorocks_ros.inference.decay.decay_library_file import library_of, load_library
 from nanorocks_ros.inference.decay.library_fit import distances, fewest_rough_nodes
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.studies.libraries.decay_simulations import (
+from nanorocks_ros.simulation.initial_state import rules_of
+from nanorocks_ros.studies.libraries.decay_simulations import build_library
+from nanorocks_ros.studies.libraries.library_nodes import (
     MEAN_SPEED,
     LibraryPlan,
-    build_library,
     cool_node,
+    simulated_node,
 )
 
 TRAY = load_trays()[1]
@@ -95,13 +97,61 @@ def test_a_library_made_with_drag_says_so_and_is_not_compared_with_decays(tmp_pa
     plan = replace(PLAN, drag=0.05)
     build_library(plan, path, HERE)
     library = load_library(str(path), packaged=False)
-    assert library.tray == tray_key(PLAN.tray, 0.05) != tray_key(PLAN.tray)
+    assert library.tray == tray_key(PLAN.tray, {'drag': 0.05}) != tray_key(PLAN.tray)
     assert json.loads(library.made_by)['tray']['drag'] == 0.05
     with pytest.raises(ConfigurationError, match=r'drag of 0.05 1/s.*make one without drag'):
         library_of(PLAN.tray, path)
     assert 'drag' not in json.loads(PLAN.specification())['tray']
     with pytest.raises(ConfigurationError, match='drag'):
         build_library(replace(PLAN, drag=-1.0), tmp_path / 'negative.npz', HERE)
+
+
+LAW = {
+    'restitution_law': 'power',
+    'wall_restitution_law': 'constant',
+    'restitution_width': 0.0,
+    'restitution_speed': 0.005,
+    'restitution_exponent': 0.6,
+    'restitution_pairs': (0.89,),
+}
+
+
+def test_a_library_of_a_law_says_so_and_is_not_compared_with_decays(tmp_path):
+    path = tmp_path / 'power.npz'
+    plan = replace(PLAN, law=LAW)
+    library = build_library(plan, path, HERE)
+    assert json.loads(library.tray)['law']['restitution_exponent'] == 0.6
+    with pytest.raises(ConfigurationError, match=r'with the laws power .*make one without a law'):
+        library_of(PLAN.tray, path)
+    wrong = {**LAW, 'restitution_law': 'pairs', 'restitution_pairs': (0.9, 0.8, 0.7)}
+    with pytest.raises(SimulationError, match='3 restitutions for 1 species'):
+        build_library(replace(PLAN, law=wrong), tmp_path / 'wrong.npz', HERE)
+
+
+def test_a_power_of_speed_cools_slow_beads_less():
+    plan = replace(PLAN, tray=TRAY, runs=20)
+    constant, falling = (cool_node(replace(plan, law=law), 7).mean(axis=0) for law in ({}, LAW))
+    # At the reference speed both lose the same; far below it the power law loses less.
+    assert falling[-1] > constant[-1] + 0.1
+
+
+def test_pairs_of_species_keep_the_ratio_of_their_losses_at_every_node():
+    mixture = replace(PLAN, tray=load_trays()[3])
+    law = {**LAW, 'restitution_law': 'pairs', 'restitution_pairs': (0.9, 0.8, 0.7)}
+    settings, tray = simulated_node(replace(mixture, law=law), 4)
+    first, second, third = settings.restitution_pairs
+    assert first == pytest.approx(settings.restitution)
+    assert 1.0 - second == pytest.approx(2.0 * (1.0 - first))
+    assert 1.0 - third == pytest.approx(3.0 * (1.0 - first))
+    assert rules_of(settings, tray).restitution[0, 1] == second
+
+
+def test_a_uniform_distribution_stays_within_0_and_1_at_every_node():
+    law = {**LAW, 'restitution_law': 'uniform', 'restitution_width': 0.3}
+    for number in range(20):
+        settings, tray = simulated_node(replace(PLAN, law=law), number)
+        rules_of(settings, tray)
+        assert settings.restitution_width <= 0.3
 
 
 def test_decays_with_drag_are_those_without_in_another_clock():

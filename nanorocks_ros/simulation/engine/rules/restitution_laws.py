@@ -1,9 +1,14 @@
-"""Laws of the normal restitution: constant, uniformly random, viscoelastic, a power of speed."""
+"""Laws of the normal restitution: constant, uniformly random, viscoelastic, a power of speed.
+
+`LAWS` is the register: a law of settings, films, sweeps and libraries is one of its names.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +16,10 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.numerics.counter_rng import hashed, uniform
 
-# The laws.
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Kinds of laws in compiled code; a table of pairs of species is constant.
 CONSTANT, UNIFORM, VISCOELASTIC, POWER = range(4)
 
 # Müller, Pöschel 2011, Phys. Rev. E 84, 021302: numerator and denominator.
@@ -78,6 +86,78 @@ class PowerLawRestitution:
 SpeedLaw = ViscoelasticRestitution | PowerLawRestitution
 """A law by which the restitution depends on the impact speed."""
 Restitution = float | UniformRestitution | SpeedLaw
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawTerms:
+    """What laws are made of; each takes what it needs.
+
+    Parameters
+    ----------
+    value : float, 0 to 1
+        The restitution, its mean, or that at `at_speed`.
+    width : float, 0 to 1
+        Full width of a uniform distribution.
+    at_speed : float, [m/s], > 0
+    exponent : float, >= 0
+    pairs : tuple of float, 0 to 1
+        Of pairs of species: first with first, first with second, ..., second with second, ...; a
+        single one holds for all pairs.
+    species : int
+        Number of species.
+    """
+
+    value: float
+    width: float = 0.0
+    at_speed: float = 1.0
+    exponent: float = 0.0
+    pairs: tuple[float, ...] = ()
+    species: int = 1
+
+
+def pair_table(terms: LawTerms) -> NDArray[np.float64]:
+    """The restitutions of all pairs of species, (n, n).
+
+    Raises
+    ------
+    SimulationError
+        When their number is not that of the pairs.
+    """
+    n = terms.species
+    wanted = n * (n + 1) // 2
+    if len(terms.pairs) not in (1, wanted):
+        raise SimulationError(
+            'restitution_pairs',
+            f'{len(terms.pairs)} restitutions for {n} species',
+            f'give {wanted}: first with first, first with second, ...; or 1 for all pairs',
+        )
+    upper = np.triu_indices(n)
+    table = np.empty((n, n))
+    table[upper] = terms.pairs
+    table.T[upper] = table[upper]
+    return table
+
+
+def _viscoelastic(terms: LawTerms) -> ViscoelasticRestitution:
+    return ViscoelasticRestitution(value=terms.value, at_speed=terms.at_speed)
+
+
+def _power(terms: LawTerms) -> PowerLawRestitution:
+    return PowerLawRestitution(value=terms.value, at_speed=terms.at_speed, exponent=terms.exponent)
+
+
+SPEED_LAWS: dict[str, Callable[[LawTerms], SpeedLaw]] = {
+    'viscoelastic': _viscoelastic,
+    'power': _power,
+}
+"""Laws by which the restitution depends on the impact speed, of beads and of walls."""
+LAWS: dict[str, Callable[[LawTerms], Restitution | NDArray[np.float64]]] = {
+    'constant': lambda terms: terms.value,
+    'uniform': lambda terms: UniformRestitution(mean=terms.value, width=terms.width),
+    **SPEED_LAWS,
+    'pairs': pair_table,
+}
+"""All laws between beads by their names in settings."""
 
 
 @inlined

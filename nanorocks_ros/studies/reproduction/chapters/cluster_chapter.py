@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 _MM = 1e3
 _TRAYS = (1, 3, 5)
 _SHOWN = 3
+# A count this long before the end of a cycle is none of its end, [s]: under chalk tracks are lost.
+_AT_END = 5.0
 _COUNTS = (
     'clusters', 'clustered_share', 'weighted_size', 'clusters_error', 'clustered_share_error'
 )  # fmt: skip
@@ -64,7 +66,7 @@ def cluster_chapter(context: Context) -> Chapter:
     counts, sizes, differences, findings = [], [], [], []
     for number, tray in load_trays().items():
         truth = [_true_end(cycle, tray) for cycle in context.sticking]
-        ours = [_our_end(cycle, tray) for cycle in context.sticking]
+        ours = [tracked_end(cycle, tray) for cycle in context.sticking]
         paper = PAPER_TABLE_3[number]
         by_hand = (
             f'{paper.clusters:.2f}',
@@ -142,7 +144,7 @@ def cluster_chapter(context: Context) -> Chapter:
     return Chapter(section=section, differences=differences, findings=findings)
 
 
-class _End(NamedTuple):
+class ClusterEnd(NamedTuple):
     """Clusters at the end of a cycle; NaN where unknown, errors 0 for the truth."""
 
     clusters: float
@@ -153,29 +155,36 @@ class _End(NamedTuple):
     share_error: float = 0.0
 
 
-def _true_end(cycle: CycleFiles, tray: Tray) -> _End:
+def _true_end(cycle: CycleFiles, tray: Tray) -> ClusterEnd:
     truth = cycle.summary['truth'][str(tray.number)]
     clusters, beads = truth['clusters'][-1], truth['beads_in_clusters'][-1]
     mean = beads / clusters if clusters else math.nan
-    return _End(clusters, mean, beads / tray.count, truth['weighted_size'][-1])
+    return ClusterEnd(clusters, mean, beads / tray.count, truth['weighted_size'][-1])
 
 
-def _our_end(cycle: CycleFiles, tray: Tray) -> _End:
-    """The last count of bodies by tracks."""
+def tracked_end(cycle: CycleFiles, tray: Tray) -> ClusterEnd:
+    """Clusters at the end of a cycle by tracks; unknown where these were lost before it.
+
+    Parameters
+    ----------
+    cycle : CycleFiles
+    tray : Tray
+    """
     path = cycle.results / f'tray_{tray.number}_bodies.csv'
     if not path.is_file():
-        return _End(*4 * (math.nan,))
-    columns = read_columns(path, _COUNTS)
-    if not columns['clusters'].size:
-        return _End(*4 * (math.nan,))
+        return ClusterEnd(*4 * (math.nan,))
+    columns = read_columns(path, ('time', *_COUNTS))
+    end = cycle.summary['truth'][str(tray.number)]['time'][-1]
+    if not (columns['time'].size and columns['time'][-1] > end - _AT_END):
+        return ClusterEnd(*4 * (math.nan,))
     clusters, share, size, clusters_error, share_error = (
         float(columns[name][-1]) for name in _COUNTS
     )
     mean = share * tray.count / clusters if clusters > 0.0 else math.nan
-    return _End(clusters, mean, share, size, clusters_error, share_error)
+    return ClusterEnd(clusters, mean, share, size, clusters_error, share_error)
 
 
-def _table_3_cells(ends: Sequence[_End]) -> tuple[str, str, str]:
+def _table_3_cells(ends: Sequence[ClusterEnd]) -> tuple[str, str, str]:
     """Clusters, beads in each, and share of the beads in clusters, [%]."""
     each = np.array([end.beads_per_cluster for end in ends])
     each = each[np.isfinite(each)]

@@ -20,6 +20,8 @@ from nanorocks_ros.physics.paper_formulas import (
     paper_restitution_of_decay,
     paper_wall_ellipse,
 )
+from nanorocks_ros.settings import PriorSettings
+from nanorocks_ros.studies.analysis.contact_tables import contacts_of_results
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
 from nanorocks_ros.studies.decays.cooling_windows import cooling_window
 from nanorocks_ros.studies.figures.cor_figures import (
@@ -33,6 +35,7 @@ from nanorocks_ros.studies.figures.cor_figures import (
     cor_figures,
     prepare_folder,
 )
+from nanorocks_ros.studies.figures.impact_figure import ImpactData, impact_figure
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import (
     Chapter,
     Difference,
@@ -56,6 +59,8 @@ _BEADS = tuple(0.5 + 0.02 * k for k in range(26))
 _WALLS = tuple(0.8 + 0.02 * k for k in range(11))
 # Restitution of the decay to which the closed form of the paper is applied in the errata.
 _EXAMPLE = 0.8
+# Chance of a constant restitution below which contacts contradict it.
+_LEAST_CHANCE = 0.05
 _WIDTHS = (0.0, 0.04, 0.08, 0.12, 0.16)
 
 
@@ -86,6 +91,7 @@ def restitution_chapter(context: Context) -> Chapter:
         ),
         *_errata(),
         *_search_parts(context),
+        _impacts_part(context),
     ]  # fmt: skip
     return Chapter(section=section, differences=differences, findings=[finding])
 
@@ -130,6 +136,43 @@ def _search_parts(context: Context) -> list[Picture | str]:
         caption = 'Figure 13: restitution against speed, and the effect of noise alone.'
         return [*parts, Picture(path=folder / SPEED, caption=caption)]
     return [*parts, 'Figure 13 needs more speeds above their noise than these cycles have.']
+
+
+def _impacts_part(context: Context) -> Picture | str:
+    """What Figure 13 asks, from single contacts, or why it cannot be drawn."""
+    path = context.picture('impacts.png')
+    prior = PriorSettings()
+    try:
+        folders = [cycle.results for cycle in context.bouncing]
+        terms, losses, cycles = contacts_of_results(folders, _TRAY, prior)
+        values = impact_figure(
+            path,
+            ImpactData(tray=_TRAY, cycles=cycles, terms=terms, losses=losses, prior=prior),
+        )
+    except (FitError, RecordingError) as error:
+        return f'The restitution against the impact speed could not be drawn: {error}.'
+    return Picture(
+        path=path,
+        caption='What Figure 13 asks, answered by single contacts: the speed along the normal of '
+        'each, not the mean speed of the gas, and its restitution, not what is left of a mean '
+        f'speed after a second. {_law_in_words(values["beads"])} The slowest range reads '
+        'low: an error of the speed after a contact is in both axes.',
+    )
+
+
+def _law_in_words(beads: dict[str, Any] | None) -> str:
+    if beads is None or beads['law'] is None:
+        return 'Collisions are too few for a law.'
+    exponent, chance = beads['law']['exponent'], beads['law']['chance_of_constant']
+    seen = 'are compatible with' if chance >= _LEAST_CHANCE else 'contradict'
+    return (
+        f'Collisions {seen} a constant restitution of the beads, which is true here: the exponent '
+        f'of 1 − restitution is {with_interval(exponent["value"], _ends(exponent))}.'
+    )
+
+
+def _ends(limits: dict[str, float]) -> tuple[float, float]:
+    return limits['lower'], limits['upper']
 
 
 def _energy_part(context: Context) -> Picture | str:
