@@ -88,9 +88,7 @@ def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.studies.analysis.results_json import as_json
 
     source = Path(options.bags[0])
-    # `.` and `..` have no name of a folder.
-    resolved = source if source.name not in ('', '..') else source.resolve()
-    folder = Path(options.output or f'{resolved}_results')
+    folder = Path(options.output or f'{_stem(Path(options.named[0]))}_results')
     settings, notices, _ = bag_settings(options, source)
     scratch = _scratch_folder() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
@@ -122,6 +120,15 @@ def _run_one(options: argparse.Namespace) -> int:
     if error is not None:
         raise error
     return 0
+
+
+def _stem(named: Path) -> Path:
+    """What the results of a recording are named after; of a video without its ending."""
+    from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES
+
+    # `.` and `..` have no name of a folder.
+    resolved = named if named.name not in ('', '..') else named.resolve()
+    return resolved.with_suffix('') if resolved.suffix in VIDEO_SUFFIXES else resolved
 
 
 def _scratch_folder() -> Path | None:

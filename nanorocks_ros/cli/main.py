@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
+from nanorocks_ros.cli.films import use_imports
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
     try:
         options = build_parser().parse_args(arguments)
+        use_imports(options)
         code: int = options.run(options)
     except ConfigurationError as error:
         print(f'nanorocks: {error}', file=sys.stderr)
