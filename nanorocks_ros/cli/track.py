@@ -25,10 +25,12 @@ _PERCENT = 100.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
+    from nanorocks_ros.cli.film_options import add_film_options
     from nanorocks_ros.cli.flags import add_bag
 
-    parser = commands.add_parser('track', help='track all beads of a bag')
+    parser = commands.add_parser('track', help='track all beads of a film or bag')
     add_bag(parser)
+    add_film_options(parser)
     parser.add_argument('-o', '--output', help='table of the tracks to write, .csv or .parquet')
     parser.add_argument('--picture', help='picture of the last frame with tracks to write, .png')
     parser.add_argument(
@@ -61,10 +63,12 @@ def run(options: argparse.Namespace) -> int:
 
 def tracked_bag(options: argparse.Namespace) -> TrackedBag:
     """Track the beads of the bag of the options, with progress; print what is to be known."""
+    from nanorocks_ros.cli.film_options import print_notices, use_described_film
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 
+    print_notices(use_described_film(options, Path(options.bag)))
     settings, assumed, _ = bag_settings(options, options.bag)
     with Progress('tracking') as progress:
         bag = track_bag(

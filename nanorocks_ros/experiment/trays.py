@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.film_section import SECTION
 from nanorocks_ros.experiment.materials import (
     GRAM_PER_CUBIC_CENTIMETRE,
     Material,
@@ -195,7 +196,7 @@ class _TrayFile(YamlLines):
     def trays(self, root: yaml.Node | None) -> dict[int, Tray]:
         if root is None:
             raise self.error(None, 'is empty', 'describe at least one tray under "trays:"')
-        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials'})
+        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials', SECTION})
         self._read_materials(top)
         trays = {}
         for key, node in self.pairs(top['trays']):

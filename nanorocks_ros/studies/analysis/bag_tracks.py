@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.experiment.film_section import FilmSection, film_section
 from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 
@@ -44,6 +45,8 @@ class TrackedBag:
         What is known of the lens.
     regions : dict of int to Region
         Where the trays are in the rectified frame.
+    film : FilmSection or None
+        What the trays file says of the film.
     """
 
     epoch_ns: int
@@ -56,6 +59,7 @@ class TrackedBag:
     notices: list[str] = field(default_factory=list)
     view: View | None = None
     regions: dict[int, Region] = field(default_factory=dict)
+    film: FilmSection | None = None
 
 
 def track_bag(
@@ -95,6 +99,7 @@ def track_bag(
         tracks={number: [] for number in images.trays},
         numbers={number: [] for number in images.trays},
         view=images.view,
+        film=film_section(settings.trays_file),
     )
     for shot in images.shots(progress):
         for image in shot.images:

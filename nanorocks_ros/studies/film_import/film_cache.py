@@ -83,7 +83,7 @@ def cached_import(film: Path, progress: Callable[[float], None]) -> CachedFilm:
     bag, record = folder / film.resolve().name, folder / f'{film.resolve().name}.json'
     known = _read(record)
     if known.get('film') == state and bag.is_dir():
-        return CachedFilm(bag, int(known.get('frames', 0)), (), reused=True)
+        return CachedFilm(bag, int(str(known.get('frames', 0))), (), reused=True)
     part = Path(tempfile.mkdtemp(prefix='.part-', dir=folder))
     try:
         imported = import_films([film], part / bag.name, ImportSettings(), progress)
