@@ -84,6 +84,7 @@ def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
+    from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
     from nanorocks_ros.studies.analysis.results_json import as_json
 
@@ -119,7 +120,7 @@ def _run_one(options: argparse.Namespace) -> int:
         print(written, file=sys.stderr)
     if error is not None:
         raise error
-    return 0
+    return 0 if analysis.usable else EXIT_NOT_USABLE
 
 
 def _stem(named: Path) -> Path:
@@ -162,13 +163,14 @@ def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
         last_of_each_cycle,
     )
 
+    recognised = [line for verdict in results.verdicts for line in verdict.lines()]
     reason = tray_reason(results)
     if reason is not None:
-        return [f'no COR: {reason.text}; {reason.remedy}']
+        return [*recognised, f'no COR: {reason.text}; {reason.remedy}']
     cycles = last_of_each_cycle(results.cors)
     used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
     ends = ends_of_cycles(results.clusters)
-    lines = [f'priors: {priors_in_words(analysis.prior)}']
+    lines = [*recognised, f'priors: {priors_in_words(analysis.prior)}']
     left_out = 0
     for cor in cycles:
         is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)

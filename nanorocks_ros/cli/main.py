@@ -64,7 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 after success, 1 for unusable input, 2 for a wrong call, 130 when interrupted.
+        0 after success, 1 for unusable input, 2 for a wrong call, 3 when done with a result that
+        cannot be used, 130 when interrupted.
     """
     # Set before numpy is loaded: arrays here are too small for a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')

@@ -44,8 +44,11 @@ class Species:
     diameter_low, diameter_high : float, [m]
         Ends of the range of diameters; equal when all beads are alike.
     count : int
+        Of the beads; where `counted` is False the largest number that may be there.
     mass : float or None, [kg]
         Total mass, where the paper gives that instead of a count.
+    counted : bool
+        Whether the number of beads is known.
     """
 
     properties: Material
@@ -53,11 +56,17 @@ class Species:
     diameter_high: float
     count: int
     mass: float | None = None
+    counted: bool = True
 
     @property
     def material(self) -> str:
         """Name of the material."""
         return self.properties.name
+
+    @property
+    def expected(self) -> int | None:
+        """Number of beads; None where it is not known."""
+        return self.count if self.counted else None
 
     @property
     def density(self) -> float:

@@ -29,6 +29,7 @@ from nanorocks_ros.stages.speed.structure_speed import StructureSpeed
 from nanorocks_ros.stages.speed.track_speed import TrackSpeed
 from nanorocks_ros.stages.speed.tray_oscillation import TrayOscillation
 from nanorocks_ros.stages.stage import RestartingStage
+from nanorocks_ros.stages.tracking.recognition_counts import RecognitionCounter
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         Also emit a :class:`MotionMask` per image; off by default.
     emit_tracks : bool
         Also emit the :class:`Tracks` of each image, where they are made; off by default.
+    recognition : RecognitionCounter
+        How well the beads have been recognised since the start.
     """
 
     clock = TrayImage
@@ -90,6 +93,9 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
         drag = Measured(settings.prior.drag, settings.prior.drag_error)
+        self.recognition = RecognitionCounter(
+            tray, settings.tracking.max_speed, crowded=self._tracker.crowded
+        )
         self._contacts = ContactFinder(tray, drag)
         self._bodies = BodyCounter(settings, tray)
         self._scale = ScaleCheck(settings, tray)
@@ -120,6 +126,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             speeds += self._track_speed.push(image)
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
+                self.recognition.push(tracks)
                 notices += self._camera_notices(image, tracks)
                 contacts = self._contacts_in(tracks)
                 notices += self._scale_notices(tracks, contacts)

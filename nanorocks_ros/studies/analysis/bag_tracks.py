@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.film_section import FilmSection, film_section
+from nanorocks_ros.stages.tracking.recognition_counts import RecognitionCounter
 from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
+from nanorocks_ros.studies.analysis.recognition_verdicts import recognition_verdicts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.view import View
     from nanorocks_ros.records import Tracks, TrayImage
     from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.analysis.recognition_verdicts import Verdict
 
 
 @dataclass(slots=True, kw_only=True)
@@ -47,6 +50,8 @@ class TrackedBag:
         Where the trays are in the rectified frame.
     film : FilmSection or None
         What the trays file says of the film.
+    verdicts : dict of int to tuple of Verdict
+        How well the beads were recognised, by tray.
     """
 
     epoch_ns: int
@@ -60,6 +65,12 @@ class TrackedBag:
     view: View | None = None
     regions: dict[int, Region] = field(default_factory=dict)
     film: FilmSection | None = None
+    verdicts: dict[int, tuple[Verdict, ...]] = field(default_factory=dict)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the beads of all trays were recognised well enough to use the tracks."""
+        return all(verdict.usable for rows in self.verdicts.values() for verdict in rows)
 
 
 def track_bag(
@@ -112,7 +123,20 @@ def track_bag(
     bag.notices = images.notices
     if not any(bag.tracks.values()):
         raise _without_colour(images.bag.where)
+    bag.verdicts = {
+        number: _verdicts(bag, number, settings.tracking.max_speed, tracker)
+        for number, tracker in trackers.items()
+    }
     return bag
+
+
+def _verdicts(
+    bag: TrackedBag, number: int, max_speed: float, tracker: Tracker
+) -> tuple[Verdict, ...]:
+    counter = RecognitionCounter(bag.trays[number], max_speed, crowded=tracker.crowded)
+    for tracks in bag.tracks[number]:
+        counter.push(tracks)
+    return recognition_verdicts(counter.counts())
 
 
 def _without_colour(where: str) -> FrameError:

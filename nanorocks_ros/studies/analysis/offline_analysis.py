@@ -24,6 +24,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PriorSettings
 from nanorocks_ros.studies.analysis.bag_images import PreprocessedFrames, open_camera
+from nanorocks_ros.studies.analysis.recognition_verdicts import recognition_verdicts
 from nanorocks_ros.wire.products import MEASURED, is_measured
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.pipeline.composition import Result
     from nanorocks_ros.records import ArrayRecord, RecordType
     from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.analysis.recognition_verdicts import Verdict
 
 
 # A gap of more than this many usual intervals means that frames are missing.
@@ -61,6 +63,8 @@ class TrayResults:
         What the cycles say of the restitutions, so that cycles of other recordings can be added.
     sticking : tuple of StickingCycle
         What they say of the sticking speed.
+    verdicts : tuple of Verdict
+        How well each species was recognised; empty where beads were not tracked.
     """
 
     def __init__(
@@ -76,6 +80,7 @@ class TrayResults:
         self.truth = truth or []
         self.evidence: CycleLikelihoods | None = None
         self.sticking: tuple[StickingCycle, ...] = ()
+        self.verdicts: tuple[Verdict, ...] = ()
         for record in records:
             self.add(record)
 
@@ -161,6 +166,13 @@ class Analysis:
     metadata: dict[str, str] = field(default_factory=dict)
     include_inconsistent: bool = False
     prior: PriorSettings = field(default_factory=PriorSettings)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the beads of all trays were recognised well enough to use the result."""
+        return all(
+            verdict.usable for results in self.trays.values() for verdict in results.verdicts
+        )
 
     @property
     def frames(self) -> int:
@@ -257,6 +269,8 @@ def analyse(
     for number, stages in pipeline.trays.items():
         result.trays[number].evidence = stages.restitution.evidence
         result.trays[number].sticking = stages.clusters.cycles
+        counts = stages.measurement.recognition.counts()
+        result.trays[number].verdicts = recognition_verdicts(counts)
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = [*bag.reader.notices, *bag.notices]
     result.complete = result.complete and bag.reader.complete
