@@ -26,8 +26,12 @@ if TYPE_CHECKING:
 _NOMINAL_DIAMETER = 2e-3
 # Largest path of a bead between two pictures, in diameters, where nothing is told.
 _MAX_STEP = 2.0
-# Beads side by side cover at most this share of the tray.
-_FULL, _MAX_BEADS = 0.6, 600
+# Share of the tray that beads side by side may cover, and their number, in each round of counting:
+# the threshold of recognition follows from what is expected.
+_ROUNDS = (0.02, 0.1, 0.5)
+_MAX_BEADS = 2000
+# Counted beads over the most that may be counted, above which a round is repeated with more.
+_NEARLY_ALL = 0.7
 # Largest difference of the scales along both sides, relative.
 _MAX_SKEW = 0.03
 _MM = 1e3
@@ -132,10 +136,16 @@ def described_tray(
     if known:
         assert filmed.sides is not None
         sides = (*filmed.sides, sides[2])
-    guessed = replace(filmed, beads=tuple(_with_count(beads, region) for beads in filmed.beads))
-    if guessed != filmed:
-        counts = counted_beads(_text(guessed, section, sides), section, frames)
+    guessed = filmed
+    for share in _ROUNDS:
+        if all(beads.count is not None for beads in filmed.beads):
+            break
+        most = tuple(_most_beads(beads, region, share) for beads in filmed.beads)
+        counts = counted_beads(_text(_with_counts(filmed, most), section, sides), section, frames)
         guessed = _with_counts(filmed, counts)
+        if all(count < _NEARLY_ALL * limit for count, limit in zip(counts, most, strict=True)):
+            break
+    if guessed != filmed:
         told = ' and '.join(str(beads.count) for beads in guessed.beads)
         notices.append(f'the number of beads is not told; {told} are seen; --count sets it')
     return DescribedTray(text=_text(guessed, section, sides), notices=tuple(notices))
@@ -188,11 +198,10 @@ def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float
     )
 
 
-def _with_count(beads: FilmedBeads, region: tuple[int, int, int, int]) -> FilmedBeads:
-    if beads.count is not None:
-        return beads
-    room = _FULL * region[2] * region[3] / (0.25 * math.pi * beads.diameter_px**2)
-    return replace(beads, count=max(1, min(int(room), _MAX_BEADS)))
+def _most_beads(beads: FilmedBeads, region: tuple[int, int, int, int], share: float) -> int:
+    """The number of beads that cover a share of the tray."""
+    room = share * region[2] * region[3] / (0.25 * math.pi * beads.diameter_px**2)
+    return max(3, min(int(room), _MAX_BEADS))
 
 
 def _with_counts(filmed: FilmedTray, counts: tuple[int, ...]) -> FilmedTray:
