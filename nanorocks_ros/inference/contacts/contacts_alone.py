@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,9 +102,13 @@ def contacts_alone(
     losses = flight_losses(flight_table(flights), Measured(prior.drag, prior.drag_error))
     is_known = losses.flights > 0 and losses.drag.value > 3.0 * losses.drag.error
     drag = losses.drag.value if is_known else max(prior.drag, 0.0)
-    own = [dragged(contact, drag) for contact in contacts]
+    own = [_complete(dragged(contact, drag)) for contact in contacts]
     rebounds = [contact for contact in own if isinstance(contact, Rebound)]
-    collisions = [contact for contact in own if isinstance(contact, PairCollision)]
+    collisions = [
+        contact
+        for contact in own
+        if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
+    ]
     slowing = Slowing.by_drag(Measured(drag, losses.drag.error if is_known else 0.0))
     numbers = sorted({rebound.wall for rebound in rebounds})
 
@@ -127,6 +131,11 @@ def contacts_alone(
         },
         drag=losses.drag,
     )
+
+
+def _complete(contact: Rebound | PairCollision) -> Rebound | PairCollision:
+    """The contact; without friction beside it where no speed is known of that time."""
+    return contact if contact.friction_length >= 0.0 else replace(contact, friction_length=0.0)
 
 
 def _approach(pair: PairCollision) -> float:

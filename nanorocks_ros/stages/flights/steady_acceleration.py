@@ -2,6 +2,7 @@
 
 Short pieces of tracks are fitted with parabolas. A piece with a contact in it is no parabola, so
 that the pieces that are fitted well show free flights; their median does not follow the rest.
+Beads that lie on something do not fall, and hardly move: they are left out.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ PIECE = MIN_BEND_POINTS
 _MAX_GAP = 1.5
 # Least number of pieces, and largest chi square of a piece over the lower quartile of all.
 _LEAST_PIECES, _MAX_CHI_SQUARE = 6, 3.0
+# Least path along a piece, in radii.
+_LEAST_PATH = 0.5
 # Errors by which an acceleration must differ from 0.
 _SIGMAS = 5.0
 # Normal deviation over the median of absolute deviations; error of a median over that of a mean.
@@ -95,7 +98,7 @@ def steady_acceleration(tracks: Iterable[Tracks]) -> SteadyAcceleration:
 
 
 def _by_bead(tracks: Iterable[Tracks]) -> list[NDArray[np.float64]]:
-    """Time, position and its error of each bead where it is seen, (n, 4) each."""
+    """Time, position, its error and radius of each bead where it is seen, (n, 5) each."""
     beads: dict[int, list[tuple[float, ...]]] = defaultdict(list)
     first_ns: int | None = None
     for record in tracks:
@@ -103,9 +106,8 @@ def _by_bead(tracks: Iterable[Tracks]) -> list[NDArray[np.float64]]:
         time = (record.stamp_ns - first_ns) / _NS
         places = record.positions + record.displacement
         for k in np.flatnonzero(record.seen).tolist():
-            beads[int(record.ids[k])].append(
-                (time, *places[k].tolist(), float(record.position_errors[k]))
-            )
+            error, radius = float(record.position_errors[k]), float(record.radii[k])
+            beads[int(record.ids[k])].append((time, *places[k].tolist(), error, radius))
     return [np.array(rows) for rows in beads.values() if len(rows) >= PIECE]
 
 
@@ -123,6 +125,8 @@ def _fits(beads: list[NDArray[np.float64]]) -> NDArray[np.float64]:
             row = np.zeros(BEND_SIZE)
             columns = np.ascontiguousarray(bead[first : first + PIECE].T)
             places = np.ascontiguousarray(columns[1:3].T)
-            if write_bend(columns[0], places, columns[3], row):
+            path = float(np.hypot(*np.ptp(places, axis=0)))
+            moves = path > _LEAST_PATH * columns[4].mean()
+            if moves and write_bend(columns[0], places, columns[3], row):
                 rows.append(row)
     return np.array(rows).reshape(-1, BEND_SIZE)
