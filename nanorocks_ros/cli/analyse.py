@@ -145,11 +145,12 @@ def _print(analysis: Analysis) -> None:
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
-        for line in _tray_lines(analysis, results):
+        for line in tray_lines(analysis, results):
             print(f'  {line}')
 
 
-def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
+def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
+    """The cycles of a tray in lines of text."""
     from nanorocks_ros.studies.analysis.cycle_words import (
         cycle_lines,
         is_decay_left_out,

@@ -19,7 +19,7 @@ _MM = 1e-3
 def add_film_options(parser: argparse.ArgumentParser) -> None:
     """Add the options; each species of beads has its diameter, count and density."""
     group = parser.add_argument_group('the film, in place of a trays file')
-    several = {'type': float, 'nargs': '+', 'metavar': 'V'}
+    several: dict[str, Any] = {'type': float, 'nargs': '+', 'metavar': 'V'}
     group.add_argument('--diameter-px', help='diameter of the beads in the picture', **several)
     group.add_argument('--diameter-mm', help='diameter of the beads', **several)
     group.add_argument('--count', type=int, nargs='+', metavar='N', help='number of beads')

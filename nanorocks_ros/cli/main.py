@@ -34,6 +34,7 @@ COMMANDS = {
     'info': 'recordings.info',
     'library': 'calibration.library',
     'look': 'look',
+    'measure': 'measure',
     'reproduce': 'reproduce',
     'salvage': 'recordings.salvage',
     'simulate': 'simulation.simulate',

@@ -123,17 +123,35 @@ def track_bag(
     bag.notices = images.notices
     if not any(bag.tracks.values()):
         raise _without_colour(images.bag.where)
+    crowded = {number for number, tracker in trackers.items() if tracker.crowded}
+    return recognised(bag, settings, frozenset(crowded))
+
+
+def recognised(
+    bag: TrackedBag, settings: PipelineSettings, crowded: frozenset[int] = frozenset()
+) -> TrackedBag:
+    """The bag with a verdict on each species of each tray.
+
+    Parameters
+    ----------
+    bag : TrackedBag
+        Changed.
+    settings : PipelineSettings
+    crowded : frozenset of int
+        Trays with too many grains to be tracked.
+    """
+    max_speed = settings.tracking.max_speed
     bag.verdicts = {
-        number: _verdicts(bag, number, settings.tracking.max_speed, tracker)
-        for number, tracker in trackers.items()
+        number: _verdicts(bag, number, max_speed, crowded=number in crowded)
+        for number in bag.trays
     }
     return bag
 
 
 def _verdicts(
-    bag: TrackedBag, number: int, max_speed: float, tracker: Tracker
+    bag: TrackedBag, number: int, max_speed: float, *, crowded: bool
 ) -> tuple[Verdict, ...]:
-    counter = RecognitionCounter(bag.trays[number], max_speed, crowded=tracker.crowded)
+    counter = RecognitionCounter(bag.trays[number], max_speed, crowded=crowded)
     for tracks in bag.tracks[number]:
         counter.push(tracks)
     return recognition_verdicts(counter.counts())
