@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
 from nanorocks_ros.cli.films import use_imports
+from nanorocks_ros.cli.remedies import with_own_files
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 
 if TYPE_CHECKING:
@@ -75,15 +76,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
     # Its messages about missing fonts are of no use to the user.
     logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
+    options = None
     try:
         options = build_parser().parse_args(arguments)
         use_imports(options)
         code: int = options.run(options)
     except ConfigurationError as error:
-        print(f'nanorocks: {error}', file=sys.stderr)
+        print(f'nanorocks: {with_own_files(str(error), options)}', file=sys.stderr)
         return EXIT_CALL
     except NanorocksError as error:
-        print(f'nanorocks: {error}', file=sys.stderr)
+        print(f'nanorocks: {with_own_files(str(error), options)}', file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt as interruption:
         message = str(interruption) or 'files written so far can be read'

@@ -72,8 +72,9 @@ class TrackBuffer(NamedTuple):
 
     def doubled(self) -> TrackBuffer:
         """Return a copy with twice as many slots."""
-        columns = (np.concatenate([column, np.zeros_like(column)]) for column in self[:-1])
-        return TrackBuffer(*columns, acceleration=self.acceleration)
+        of_slots = self[:-1]
+        columns = [np.concatenate([column, np.zeros_like(column)]) for column in of_slots]
+        return TrackBuffer(*columns, self.acceleration)
 
 
 @compiled

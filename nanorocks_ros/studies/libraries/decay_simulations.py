@@ -25,6 +25,7 @@ from nanorocks_ros.inference.decay.library_fit import (
 from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
+from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.settings import SimulationSettings, with_values
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ _DECAYS = 'log_speed'
 _NODES_IN_TASK = 4
 # Rough nodes have random numbers of their own.
 _FIRST_ROUGH = 1 << 20
+_LEAST_BEADS = 2
 # Smallest speed over the first.
 _REST = 1e-100
 
@@ -147,6 +149,13 @@ def build_library(
     if 0 < plan.rough_nodes < fewest_rough_nodes():
         raise ConfigurationError(
             '--rough-nodes', f'{plan.rough_nodes}', f'give 0, or {fewest_rough_nodes()} or more'
+        )
+    if plan.tray.count < _LEAST_BEADS:
+        raise ConfigurationError(
+            f'tray {plan.tray.number}',
+            f'has {counted(plan.tray.count, "bead")}; a gas whose decay can be compared has '
+            f'{_LEAST_BEADS} or more',
+            'use contacts alone, which need no library: nanorocks measure FILM',
         )
     # A drag out of range is refused before any work.
     _simulated(plan, 0)
