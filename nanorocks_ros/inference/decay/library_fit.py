@@ -167,8 +167,7 @@ def _fitted(
     """
     try:
         if np.isfinite(matrix).all() and np.isfinite(target).all():
-            coefficients: NDArray[np.float64] = np.linalg.lstsq(matrix, target, rcond=_ZERO)[0]
-            return coefficients
+            return np.asarray(np.linalg.lstsq(matrix, target, rcond=_ZERO)[0], dtype=np.float64)
     except np.linalg.LinAlgError:
         pass
     raise FitError(

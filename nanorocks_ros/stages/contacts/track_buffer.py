@@ -72,9 +72,8 @@ class TrackBuffer(NamedTuple):
 
     def doubled(self) -> TrackBuffer:
         """Return a copy with twice as many slots."""
-        of_slots = self[:-1]
-        columns = [np.concatenate([column, np.zeros_like(column)]) for column in of_slots]
-        return TrackBuffer(*columns, self.acceleration)
+        columns = [np.concatenate([column, np.zeros_like(column)]) for column in self]
+        return TrackBuffer(*columns)._replace(acceleration=self.acceleration)
 
 
 @compiled
