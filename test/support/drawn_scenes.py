@@ -1,4 +1,4 @@
-"""Drawn films of beads of any look on any floor, with their places; shares no code with the package.
+"""Drawn films of beads of any look on any floor, with their places; no code of the package.
 
 Discs fly straight, bounce off the edges of the picture and off each other, and are painted one by
 one: shaded balls with highlight and cast shadow, or clear ones of which only the rim shows.
@@ -17,8 +17,8 @@ import numpy as np
 class DrawnScene:
     """A film to draw; colours are bgr, lengths in pixels, speeds in pixels per frame.
 
-    `texture` is the amplitude of stains on the floor, `light` the relative fall of the light across
-    the picture, `shadow` the darkness of cast shadows, `rim` the opacity of the rim of clear beads
+    `texture` is the amplitude of stains on the floor, `light` the fall of the light across the
+    picture, `shadow` the darkness of cast shadows, `rim` the opacity of the rim of clear beads
     (0: solid ones), `clutter` adds a rail, a stain and three holes that never move.
     """
 

@@ -104,17 +104,17 @@ def _votes(picture: NDArray[np.uint8], scale: float, voting: Voting) -> NDArray[
     noise = voting.noise * scale * 0.28 / max(blur, 0.5) ** 2
     cap = voting.step / (2.5 * math.hypot(blur, 0.7))
     rows, columns = np.nonzero(size > max(_NOISE_FACTOR * noise, 0.2 * cap))
-    weights = size[rows, columns]
-    across, down = across[rows, columns] / weights, down[rows, columns] / weights
-    weights = np.minimum(weights, cap) / voting.step
-    rows, columns = rows.astype(np.float32), columns.astype(np.float32)
+    sizes = size[rows, columns]
+    right, below = across[rows, columns] / sizes, down[rows, columns] / sizes
+    weights = np.minimum(sizes, cap) / voting.step
+    left, top = columns.astype(np.float32), rows.astype(np.float32)
     votes = np.zeros(picture.size, dtype=np.float64)
     radii = np.linspace(low, high, max(1, math.ceil(high - low) + 1))
     for sign in (1, -1) if voting.sign == 0 else (voting.sign,):
         for radius in radii:
             # The gradient points to the brighter side.
-            x = np.rint(columns + np.float32(sign * radius) * across).astype(np.int32)
-            y = np.rint(rows + np.float32(sign * radius) * down).astype(np.int32)
+            x = np.rint(left + np.float32(sign * radius) * right).astype(np.int32)
+            y = np.rint(top + np.float32(sign * radius) * below).astype(np.int32)
             inside = (x >= 0) & (x < picture.shape[1]) & (y >= 0) & (y < picture.shape[0])
             places = y[inside] * picture.shape[1] + x[inside]
             votes += np.bincount(places, weights[inside], minlength=picture.size)

@@ -72,9 +72,7 @@ def fit_outlines(
     angles = 2.0 * math.pi * np.arange(_RAYS) / _RAYS
     rays = np.stack([np.cos(angles), np.sin(angles)])
     count = len(discs)
-    last = Outlines(
-        discs, *(np.full(count, math.nan) for _ in range(2)), np.zeros(count), np.zeros(count)
-    )
+    last = Outlines(discs, np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count))
     if count == 0:
         return last
     for reach in _REACHES:
@@ -166,9 +164,7 @@ def _fitted(
     move = np.clip(solution[:, :2], -0.5 * discs[:, 2:], 0.5 * discs[:, 2:])
     enough = edges >= _LEAST_EDGES
     new[enough, :2] += move[enough]
-    new[enough, 2] = np.clip(
-        solution[enough, 2], 0.8 * voting.smallest, 1.25 * voting.largest
-    )
+    new[enough, 2] = np.clip(solution[enough, 2], 0.8 * voting.smallest, 1.25 * voting.largest)
     return Outlines(
         new,
         np.sqrt(variance * 0.5 * (covariance[:, 0, 0] + covariance[:, 1, 1])),

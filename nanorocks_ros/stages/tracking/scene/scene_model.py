@@ -53,7 +53,7 @@ _SMALLEST_PX, _LARGEST_SHARE, _RADIUS_RATIO = 2.5, 0.25, 1.3
 _RADIUS_TOLERANCE = 0.2
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
-_MOST_SAMPLES = 2000
+_MOST_SAMPLES = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,9 +137,6 @@ class SceneModel:
         self._scales = np.ones(4)
         chosen = np.linspace(0, len(frames) - 1, min(_LEARNING_FRAMES, len(frames)))
         self._learn([frames[round(k)] for k in chosen])
-        if self.scale == 1 and self.radii[1] < _LEAST_RADIUS_PX:
-            # The size was found: small beads are seen better enlarged.
-            self.__init__(frames, replace(look, radii=self.radii))  # type: ignore[misc]
 
     @property
     def radii(self) -> tuple[float, float]:
@@ -159,7 +156,8 @@ class SceneModel:
             Column, row and radius where beads are expected.
         """
         if hints is not None:
-            hints = hints * self.scale + [0.5 * (self.scale - 1.0)] * 2 + [0.0]
+            half = 0.5 * (self.scale - 1.0)
+            hints = hints * self.scale + np.array([half, half, 0.0])
         color = self._enlarged(color)
         rows = [self._outlines(color, view, hints) for view in self.views]
         # In the difference a shadow is part of its bead.
@@ -214,11 +212,9 @@ class SceneModel:
         return outlines._replace(steps=steps).chosen(good)
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
-        moving = float(
-            np.mean([self.colours.moving(self._enlarged(frame)).mean() for frame in frames])
-        )
+        shares = [self.colours.moving(self._enlarged(frame)).mean() for frame in frames]
         chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
-        self.knows_background = len(frames) > 2 and moving < _BACKGROUND_SHARE
+        self.knows_background = len(frames) > 2 and bool(np.mean(shares) < _BACKGROUND_SHARE)
         self.views = self._plain_views(chosen)
         if self.knows_background:
             self.views.append(self._view(chosen, moves=True, sign=1))
@@ -237,11 +233,10 @@ class SceneModel:
             np.concatenate([row.moving for row in rows]),
         )
         good = every.outlines.support >= _GOOD_SUPPORT
-        chosen = good & (every.moving >= _MOVING_SHARE)
-        self.sees_motion = bool(
-            chosen.sum() >= max(_LEAST_MOVING, _LEAST_MOVING_SHARE * good.sum())
-        )
-        self._remember(every, chosen if self.sees_motion else good)
+        moving = good & (every.moving >= _MOVING_SHARE)
+        enough = max(_LEAST_MOVING, _LEAST_MOVING_SHARE * good.sum())
+        self.sees_motion = bool(moving.sum() >= enough)
+        self._remember(every, moving if self.sees_motion else good)
 
     def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
         """The picture, for bright discs, dark ones, or both where both occur.
@@ -292,6 +287,15 @@ class SceneModel:
         return np.asarray(np.column_stack([candidates.colours, radii]) / self._scales)
 
 
+def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneModel:
+    """Learn what beads look like from frames of a film; see `SceneModel`."""
+    model = SceneModel(frames, look)
+    if look.radii[0] > 0.0 or model.radii[1] >= _LEAST_RADIUS_PX:
+        return model
+    # The size was found: small beads are seen better enlarged.
+    return SceneModel(frames, replace(look, radii=model.radii))
+
+
 def join_outlines(parts: Sequence[Outlines]) -> Outlines:
     """The circles of all parts."""
     return Outlines(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
@@ -332,7 +336,7 @@ def ring_colours(
     columns = np.clip(np.rint(discs[:, :1] + discs[:, 2:] * across), 0, color.shape[1] - 1)
     rows = np.clip(np.rint(discs[:, 1:2] + discs[:, 2:] * down), 0, color.shape[0] - 1)
     values = color[rows.astype(np.intp), columns.astype(np.intp)]
-    return np.median(values, axis=1).reshape(len(discs), 3).astype(np.float64)
+    return np.asarray(np.median(values, axis=1), dtype=np.float64).reshape(len(discs), 3)
 
 
 def _shares(mask: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.float64]:

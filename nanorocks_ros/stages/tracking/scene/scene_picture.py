@@ -64,6 +64,20 @@ class SceneColours:
         limit = max(_DIFFERS * self.noise, _LEAST_LEVELS)
         return np.asarray(cv2.threshold(self.difference(color), limit, 1, cv2.THRESH_BINARY)[1])
 
+    def follow(self, color: NDArray[np.uint8]) -> None:
+        """Move the background by one level towards a frame, where nothing moves."""
+        if color.shape != self.background.shape:
+            color = np.asarray(
+                cv2.resize(color, self.background.shape[1::-1], interpolation=cv2.INTER_CUBIC)
+            )
+        still = cv2.bitwise_not(cv2.merge([255 * self.moving(color)] * 3))
+        for function, limited in (
+            (cv2.add, cv2.subtract(color, self.background)),
+            (cv2.subtract, cv2.subtract(self.background, color)),
+        ):
+            step = cv2.min(cv2.bitwise_and(limited, still), np.ones_like(color))
+            self.background[...] = function(self.background, step)
+
     @property
     def _mixture(self) -> NDArray[np.float32]:
         """Weights and offset that keep the mixture of colours within 0 to 255."""
