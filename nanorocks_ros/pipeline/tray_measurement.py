@@ -33,7 +33,10 @@ from nanorocks_ros.stages.tracking.recognition_counts import RecognitionCounter
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
@@ -81,7 +84,13 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._tray = tray
         self.emit_mask = False
         self.emit_tracks = False
+        self._lesson: Sequence[NDArray[np.uint8]] = ()
         self.reset()
+
+    def learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        """Learn the look of the beads from frames of the whole film; see `Tracker.learn`."""
+        self._lesson = frames
+        self._tracker.learn(frames)
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         del stamp_ns
@@ -92,6 +101,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._cycle: tuple[int, int | None] = (0, None)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
+        if self._lesson:
+            self._tracker.learn(self._lesson)
         drag = Measured(settings.prior.drag, settings.prior.drag_error)
         self.recognition = RecognitionCounter(
             tray, settings.tracking.max_speed, crowded=self._tracker.crowded

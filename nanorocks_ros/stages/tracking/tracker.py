@@ -19,8 +19,11 @@ from nanorocks_ros.stages.tracking.linking.track_snapshot import (
     count_seen,
     in_metres,
 )
+from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.materials import Material
@@ -53,17 +56,39 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         self._settings = settings.tracking
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
-        self._expected = np.array([species.count for species in tray.species], dtype=np.int32)
+        self._expected = np.array(
+            [species.expected or 0 for species in tray.species], dtype=np.int32
+        )
+        self._lesson: tuple[NDArray[np.uint8], ...] = ()
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         """Forget the tracks and the background: the next image is the first one."""
         del stamp_ns
-        self._detector = BeadDetector(self._settings, self._tray, self._scale)
+        self._detector = self._new_detector()
         self._camera = CameraMotion()
         self._linkers: list[Linker] = []
         self._first_ns: int | None = None
         self._next_id = 0
+
+    def learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        """Learn the look of the beads from frames of the whole film, where it is not known.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+            Of the tray, spread over the film; without them the look is learnt on the way.
+        """
+        self._lesson = tuple(frames)
+        self._detector = self._new_detector()
+
+    def _new_detector(self) -> BeadDetector | SceneDetector:
+        if not self._tray.is_learnt:
+            return BeadDetector(self._settings, self._tray, self._scale)
+        detector = SceneDetector(self._tray, self._scale)
+        if self._lesson:
+            detector.learn(self._lesson)
+        return detector
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:

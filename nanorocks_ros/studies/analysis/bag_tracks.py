@@ -11,6 +11,7 @@ from nanorocks_ros.stages.tracking.recognition_counts import RecognitionCounter
 from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.analysis.recognition_verdicts import recognition_verdicts
+from nanorocks_ros.studies.analysis.scene_frames import scene_frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,6 +104,9 @@ def track_bag(
     images = BagImages(path, settings, image_topic)
     settings = images.settings
     trackers = {number: Tracker(settings, tray) for number, tray in images.trays.items()}
+    lessons = scene_frames(path, settings, image_topic=image_topic, progress=progress)
+    for number, frames in lessons.items():
+        trackers[number].learn(frames)
     bag = TrackedBag(
         epoch_ns=images.epoch_ns,
         pixels_per_metre=settings.preprocess.pixels_per_metre,

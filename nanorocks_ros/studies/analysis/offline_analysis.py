@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,11 +26,11 @@ from nanorocks_ros.records import (
 from nanorocks_ros.settings import PriorSettings
 from nanorocks_ros.studies.analysis.bag_images import PreprocessedFrames, open_camera
 from nanorocks_ros.studies.analysis.recognition_verdicts import recognition_verdicts
+from nanorocks_ros.studies.analysis.scene_frames import scene_frames
 from nanorocks_ros.wire.products import MEASURED, is_measured
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
-    from pathlib import Path
 
     from nanorocks_ros.errors import FrameError
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
@@ -238,6 +239,9 @@ def analyse(
     """
     bag, epoch_ns, view = open_camera(path, settings, image_topic)
     pipeline = Pipeline(settings, bag.where, view)
+    lessons = scene_frames(Path(path), settings, image_topic=image_topic, progress=progress)
+    for number, lesson in lessons.items():
+        pipeline.trays[number].measurement.learn(lesson)
     truth = bag.truth(epoch_ns)
     result = Analysis(
         epoch_ns=epoch_ns,

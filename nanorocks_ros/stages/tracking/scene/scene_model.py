@@ -1,0 +1,386 @@
+"""What beads look like in a film: radius, brightness, edges and colours, learnt from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nanorocks_ros.stages.tracking.scene.edge_votes import (
+    Voting,
+    centres_of_all_sizes,
+    find_centres,
+)
+from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
+from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Smallest share of the outline that votes, and that the edges on the circle cover.
+_LEAST_VOTES, LEAST_SUPPORT = 0.25, 0.5
+_GOOD_SUPPORT = 0.7
+# A disc moves where this share of it differs from the background.
+_MOVING_SHARE = 0.15
+# Moving discs that tell what beads look like, and their share of all discs.
+_LEAST_MOVING, _LEAST_MOVING_SHARE = 6, 0.1
+# A background is known where not more than this share of the pixels differs from it.
+_BACKGROUND_SHARE = 0.3
+# Trust in outlines of the difference from the background, over those of the picture itself.
+_DIFFERENCE_TRUST = 0.7
+# Circles inside and outside a disc, in radii; and how much more contrast the background has where
+# a bead has left.
+_INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
+_LEFT_CONTRAST = 1.5
+# A step is that of a bead above this part of the usual one: those of shadows are softer.
+_LEAST_STEP = 0.35
+# Colours and steps of alike discs: distance to a known one over the spread.
+_ALIKE, _ALIKE_MOVING = 3.0, 6.0
+_KNOWN_SHARE = 0.03
+# Beads below this radius are enlarged, [px].
+_LEAST_RADIUS_PX = 4.5
+# Discs of the other brightness count when they are at least this part.
+_OTHER_SIGN_SHARE = 0.4
+_LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
+# Trial radii when nothing is known of the size: smallest, part of the picture, and their ratio.
+_SMALLEST_PX, _LARGEST_SHARE, _RADIUS_RATIO = 2.5, 0.25, 1.3
+_RADIUS_TOLERANCE = 0.2
+# Frames in which discs are searched to learn from.
+_LEARNING_FRAMES = 8
+_MOST_SAMPLES = 400
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeadLook:
+    """What is told of the beads of a species.
+
+    Parameters
+    ----------
+    radii : tuple of 2 floats, [px]
+        Smallest and largest; NaN: not known.
+    sign : int
+        1: brighter than the floor, -1: darker, 0: not known.
+    colour : tuple of 3 floats or None, bgr, [gray levels]
+    """
+
+    radii: tuple[float, float] = (math.nan, math.nan)
+    sign: int = 0
+    colour: tuple[float, float, float] | None = None
+
+
+class Candidates(NamedTuple):
+    """Discs found in a frame: outlines, colour inside (n, 3), and share of the disc that moves."""
+
+    outlines: Outlines
+    colours: NDArray[np.float64]
+    moving: NDArray[np.float64]
+
+
+class View(NamedTuple):
+    """A picture in which discs are searched.
+
+    Parameters
+    ----------
+    moves : bool
+        Whether it is the difference from the background.
+    voting : Voting
+    evidence : float
+        Sum over the discs that were learnt from.
+    """
+
+    moves: bool
+    voting: Voting
+    evidence: float
+
+    def of(self, color: NDArray[np.uint8], colours: SceneColours) -> NDArray[np.uint8]:
+        """The picture, (rows, columns)."""
+        return colours.difference(color) if self.moves else colours.picture(color)
+
+
+class SceneModel:
+    """What beads of a species look like in a film.
+
+    Discs are searched in the picture itself and, where the background is known, in its difference
+    from that, which shows what moves on any floor and in any colour.
+
+    Parameters
+    ----------
+    frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        Spread over the film; one is enough where beads stand out.
+    look : BeadLook
+
+    Attributes
+    ----------
+    colours : SceneColours
+    views : list of View
+    sees_motion : bool
+        Whether discs that move told what beads look like.
+    knows_background : bool
+        Whether few enough pixels move to know what is behind the beads.
+    """
+
+    def __init__(self, frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> None:
+        colour = None if look.colour is None else np.array(look.colour)
+        self.scale = 1
+        if look.radii[0] > 0.0:
+            self.scale = max(1, math.ceil(_LEAST_RADIUS_PX / math.sqrt(math.prod(look.radii))))
+        self._look = look
+        self.colours: SceneColours = scene_colours(frames, colour).enlarged(self.scale)
+        self.sees_motion = False
+        self._known: cKDTree | None = None
+        self._scales = np.ones(4)
+        chosen = np.linspace(0, len(frames) - 1, min(_LEARNING_FRAMES, len(frames)))
+        self._learn([frames[round(k)] for k in chosen])
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Smallest and largest radius that is searched, [px]."""
+        voting = self.views[0].voting
+        return voting.smallest / self.scale, voting.largest / self.scale
+
+    def candidates(
+        self, color: NDArray[np.uint8], hints: NDArray[np.float64] | None = None
+    ) -> Candidates:
+        """Discs of the right size with an outline in a frame, alike beads or not.
+
+        Parameters
+        ----------
+        color : ndarray of uint8, (rows, columns, 3), bgr
+        hints : ndarray (k, 3), [px], optional
+            Column, row and radius where beads are expected.
+        """
+        if hints is not None:
+            half = 0.5 * (self.scale - 1.0)
+            hints = hints * self.scale + np.array([half, half, 0.0])
+        color = self._enlarged(color)
+        rows = [self._outlines(color, view, hints) for view in self.views]
+        # In the difference a shadow is part of its bead.
+        trust = [_DIFFERENCE_TRUST if view.moves else 1.0 for view in self.views]
+        outlines = join_outlines(
+            [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
+        )
+        outlines = outlines.chosen(apart(outlines))
+        if self.knows_background:
+            outlines = outlines.chosen(~self._left(color, outlines.discs))
+        colours = ring_colours(color, outlines.discs, _INSIDE)
+        moving = _shares(self.colours.moving(color), outlines.discs)
+        return Candidates(_reduced(outlines, self.scale), colours, moving)
+
+    def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        if self.scale == 1:
+            return color
+        size = color.shape[1] * self.scale, color.shape[0] * self.scale
+        return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+
+    def _left(self, color: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Discs that a bead has left: they show in the background, and less in the frame."""
+        contrasts = [
+            np.linalg.norm(
+                ring_colours(image, discs, _INSIDE) - ring_colours(image, discs, _OUTSIDE), axis=1
+            )
+            for image in (color, self.colours.background)
+        ]
+        return np.asarray(contrasts[1] > _LEFT_CONTRAST * contrasts[0] + _LEAST_COLOUR_SPREAD)
+
+    def alike(self, candidates: Candidates) -> NDArray[np.bool_]:
+        """Which of the discs look like beads."""
+        if self._known is None:
+            return np.ones(len(candidates.moving), dtype=bool)
+        # Not the nearest: what was taken for a bead by mistake is known, too.
+        nearest = max(1, round(_KNOWN_SHARE * self._known.n))
+        distances = self._known.query(self._features(candidates), k=[nearest])[0][:, 0]
+        rest = candidates.moving < _MOVING_SHARE
+        return np.asarray(distances < np.where(rest, _ALIKE, _ALIKE_MOVING))
+
+    def _outlines(
+        self, color: NDArray[np.uint8], view: View, hints: NDArray[np.float64] | None = None
+    ) -> Outlines:
+        """Discs that show in a view; their steps over the usual one."""
+        picture = view.of(color, self.colours)
+        starts = centres_of_all_sizes(picture, view.voting, _LEAST_VOTES)[:, :3]
+        if hints is not None and len(hints):
+            starts = np.concatenate([starts, hints])
+        outlines = fit_outlines(picture, starts, view.voting)
+        steps = outlines.steps / view.voting.step
+        good = (outlines.support >= LEAST_SUPPORT) & (steps >= _LEAST_STEP)
+        return outlines._replace(steps=steps).chosen(good)
+
+    def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        shares = [self.colours.moving(self._enlarged(frame)).mean() for frame in frames]
+        chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
+        self.knows_background = len(frames) > 2 and bool(np.mean(shares) < _BACKGROUND_SHARE)
+        self.views = self._plain_views(chosen)
+        if self.knows_background:
+            self.views.append(self._view(chosen, moves=True, sign=1))
+        if not self._look.radii[0] > 0.0:
+            # What moves tells the size first.
+            radii = max(self.views, key=lambda view: (view.evidence > 0.0, view.moves))
+            low, high = radii.voting.smallest, radii.voting.largest
+            self.views = [
+                view._replace(voting=view.voting._replace(smallest=low, largest=high))
+                for view in self.views
+            ]
+        rows = [self.candidates(frame) for frame in frames]
+        every = Candidates(
+            join_outlines([row.outlines for row in rows]),
+            np.concatenate([row.colours for row in rows]),
+            np.concatenate([row.moving for row in rows]),
+        )
+        good = every.outlines.support >= _GOOD_SUPPORT
+        moving = good & (every.moving >= _MOVING_SHARE)
+        enough = max(_LEAST_MOVING, _LEAST_MOVING_SHARE * good.sum())
+        self.sees_motion = bool(moving.sum() >= enough)
+        self._remember(every, moving if self.sees_motion else good)
+
+    def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
+        """The picture, for bright discs, dark ones, or both where both occur.
+
+        Between dense discs of one brightness are gaps of the other.
+        """
+        signs = (1, -1) if self._look.sign == 0 else (self._look.sign,)
+        views = [self._view(frames, moves=False, sign=sign) for sign in signs]
+        views.sort(key=lambda view: -view.evidence)
+        if not self.knows_background:
+            return views[:1]
+        return [
+            view
+            for view in views
+            if view is views[0] or view.evidence > _OTHER_SIGN_SHARE * views[0].evidence
+        ]
+
+    def _view(self, frames: Sequence[NDArray[np.uint8]], *, moves: bool, sign: int) -> View:
+        """A view of the frames with the size, brightness and edges of the discs in it."""
+        low, high = (self.scale * radius for radius in self._look.radii)
+        noise = self.colours.noise
+        view = View(moves, Voting(low, high, sign, 1.0, noise), 0.0)
+        step = _usual_step(view.of(frames[-1], self.colours), noise)
+        voting = view.voting._replace(step=step)
+        if not low > 0.0:
+            voting = _searched_radii(view.of(frames[len(frames) // 2], self.colours), voting)
+        rows = [self._outlines(frame, view._replace(voting=voting)) for frame in frames]
+        outlines = join_outlines(rows)
+        if len(outlines.steps) == 0:
+            return View(moves, voting, 0.0)
+        usual = float(np.quantile(outlines.steps, 0.75))
+        evidence = float((outlines.support**2 * outlines.steps).sum())
+        return View(moves, voting._replace(step=step * usual), evidence)
+
+    def _remember(self, candidates: Candidates, chosen: NDArray[np.bool_]) -> None:
+        """Keep what the chosen discs look like, each within the spread of all."""
+        features = self._features(candidates)[chosen]
+        if len(features) == 0:
+            return
+        spread = 1.4826 * np.median(np.abs(features - np.median(features, axis=0)), axis=0)
+        self._scales = np.maximum(spread, [_LEAST_COLOUR_SPREAD] * 3 + [_LEAST_RADIUS_SPREAD])
+        every = max(1, len(features) // _MOST_SAMPLES)
+        self._known = cKDTree(features[::every] / self._scales)
+
+    def _features(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Colour and radius, over the spread of each."""
+        radii = np.log(candidates.outlines.discs[:, 2])
+        return np.asarray(np.column_stack([candidates.colours, radii]) / self._scales)
+
+
+def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneModel:
+    """Learn what beads look like from frames of a film; see `SceneModel`."""
+    model = SceneModel(frames, look)
+    if look.radii[0] > 0.0 or model.radii[1] >= _LEAST_RADIUS_PX:
+        return model
+    # The size was found: small beads are seen better enlarged.
+    return SceneModel(frames, replace(look, radii=model.radii))
+
+
+def join_outlines(parts: Sequence[Outlines]) -> Outlines:
+    """The circles of all parts."""
+    return Outlines(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _reduced(outlines: Outlines, scale: int) -> Outlines:
+    """Circles of an enlarged picture in the picture itself."""
+    discs = outlines.discs / scale
+    discs[:, :2] -= 0.5 * (scale - 1.0) / scale
+    return outlines._replace(
+        discs=discs, errors=outlines.errors / scale, radius_errors=outlines.radius_errors / scale
+    )
+
+
+def apart(outlines: Outlines) -> NDArray[np.bool_]:
+    """Which discs to keep, so that no two lie on one another; better ones first."""
+    discs = outlines.discs
+    order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
+    keep = np.zeros(len(discs), dtype=bool)
+    if len(discs) == 0:
+        return keep
+    pairs = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], 1.0 * discs[:, 2])
+    taken = np.zeros(len(discs), dtype=bool)
+    for k in order:
+        if not taken[k]:
+            keep[k] = True
+            taken[pairs[k]] = True
+    return keep
+
+
+def ring_colours(
+    color: NDArray[np.uint8], discs: NDArray[np.float64], parts: Sequence[float]
+) -> NDArray[np.float64]:
+    """Median colour of the circles around each centre of these parts of the radius, (n, 3)."""
+    turns = np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False)
+    across = np.outer(parts, np.cos(turns)).ravel()
+    down = np.outer(parts, np.sin(turns)).ravel()
+    columns = np.clip(np.rint(discs[:, :1] + discs[:, 2:] * across), 0, color.shape[1] - 1)
+    rows = np.clip(np.rint(discs[:, 1:2] + discs[:, 2:] * down), 0, color.shape[0] - 1)
+    values = color[rows.astype(np.intp), columns.astype(np.intp)]
+    return np.asarray(np.median(values, axis=1), dtype=np.float64).reshape(len(discs), 3)
+
+
+def _shares(mask: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of the bounding square of each disc in which the mask is 1."""
+    sums = cv2.integral(mask).astype(np.float64)
+    low = np.floor(discs[:, :2] - discs[:, 2:]).astype(np.intp)
+    high = np.ceil(discs[:, :2] + discs[:, 2:]).astype(np.intp) + 1
+    limits = np.array([mask.shape[1], mask.shape[0]])
+    low, high = np.clip(low, 0, limits), np.clip(high, 0, limits)
+    inside = (
+        sums[high[:, 1], high[:, 0]]
+        - sums[low[:, 1], high[:, 0]]
+        - sums[high[:, 1], low[:, 0]]
+        + sums[low[:, 1], low[:, 0]]
+    )
+    return np.asarray(inside / np.maximum((high - low).prod(axis=1), 1))
+
+
+def _usual_step(picture: NDArray[np.uint8], noise: float) -> float:
+    """Step of a strong edge of the picture, where beads are not yet known."""
+    across = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)
+    down = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)
+    size = cv2.magnitude(across, down)
+    edges = size[size > max(2.0 * noise, 1.0)]
+    # An edge spreads over about three pixels.
+    return max(3.0 * float(np.quantile(edges, 0.8)) if edges.size else 0.0, 4.0 * noise, 4.0)
+
+
+def _searched_radii(picture: NDArray[np.uint8], start: Voting) -> Voting:
+    """With smallest and largest radius of the discs that cover most of the outlines."""
+    largest = _LARGEST_SHARE * min(picture.shape)
+    count = max(1, math.ceil(math.log(largest / _SMALLEST_PX) / math.log(_RADIUS_RATIO)))
+    best, chosen = 0.0, start._replace(smallest=_SMALLEST_PX, largest=largest)
+    for k in range(count):
+        middle = _SMALLEST_PX * _RADIUS_RATIO ** (k + 0.5)
+        ratio = math.sqrt(_RADIUS_RATIO)
+        voting = start._replace(smallest=middle / ratio, largest=middle * ratio)
+        centres = find_centres(picture, voting, 2.0 * _LEAST_VOTES)
+        outlines = fit_outlines(picture, centres[:, :3], voting)
+        outlines = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
+        outlines = outlines.chosen(apart(outlines))
+        evidence = float((outlines.support**2 * outlines.discs[:, 2] * outlines.steps).sum())
+        if evidence > best:
+            radius = float(np.median(outlines.discs[:, 2]))
+            low, high = radius * (1.0 - _RADIUS_TOLERANCE), radius * (1.0 + _RADIUS_TOLERANCE)
+            best, chosen = evidence, start._replace(smallest=low, largest=high)
+    return chosen
