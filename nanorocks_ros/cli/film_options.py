@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.appearance import AUTO
 
 if TYPE_CHECKING:
     from nanorocks_ros.studies.measure.film_tray import FilmedBeads, FilmedTray
@@ -23,6 +24,12 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument('--diameter-px', help='diameter of the beads in the picture', **several)
     group.add_argument('--diameter-mm', help='diameter of the beads', **several)
     group.add_argument('--count', type=int, nargs='+', metavar='N', help='number of beads')
+    group.add_argument(
+        '--look', nargs='+', metavar='LOOK', help='dark, bright or auto (default), on the floor'
+    )
+    group.add_argument(
+        '--colour', nargs='+', metavar='COLOUR', help='name, "#rrggbb" or auto (default)'
+    )
     group.add_argument('--density-g-cm3', help='of the beads; default 1', **several)
     group.add_argument(
         '--corners',
@@ -70,7 +77,7 @@ def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...
             '--diameter-px', 'and --trays-file both describe the beads', 'leave out one of them'
         )
     samples = film_samples(bag, options.image_topic)
-    tray = described_tray(filmed, samples.frames, samples.rate)
+    tray = described_tray(filmed, samples.size, samples.rate)
     options.trays_file = tray.text
     return tray.notices
 
@@ -116,6 +123,8 @@ def _beads(options: argparse.Namespace, k: int) -> FilmedBeads:
         diameter=None if diameter is None else _MM * diameter,
         count=value(options.count),
         density=value(options.density_g_cm3),
+        look=value(options.look) or AUTO,
+        colour=value(options.colour) or AUTO,
     )
 
 
@@ -126,13 +135,14 @@ def _check(options: argparse.Namespace) -> None:
         '--count': options.count,
         '--density-g-cm3': options.density_g_cm3,
     }
+    words = {'--look': options.look, '--colour': options.colour}
     single = [] if options.height_mm is None else [options.height_mm]
     positive = {**lists, '--sides-mm': options.sides_mm, '--height-mm': single}
     for flag, values in positive.items():
         for value in values or []:
             if not (math.isfinite(value) and value > 0):
                 raise ConfigurationError(flag, f'{value:g}', 'give numbers above 0')
-    given = {flag: values for flag, values in lists.items() if values is not None}
+    given = {flag: values for flag, values in (lists | words).items() if values is not None}
     others = {'--corners': options.corners, '--sides-mm': options.sides_mm, '--height-mm': single}
     if not options.diameter_px:
         for flag, values in {**given, **others}.items():

@@ -129,7 +129,11 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         return (*contacts, *self._flights())
 
     def _mass(self, jump: VelocityJump) -> float:
-        return self._tray.species[jump.species].density * 4.0 / 3.0 * math.pi * jump.radius**3
+        """Mass of a bead, [kg]; of density 1 where one is not known, since ratios count."""
+        density = self._tray.species[jump.species].density
+        if any(math.isnan(species.density) for species in self._tray.species):
+            density = 1.0
+        return density * 4.0 / 3.0 * math.pi * jump.radius**3
 
     def _contact_at(self, jump: VelocityJump) -> tuple[Contact, ...]:
         crossing = Intersection(*intersect_lines(jump.lines[None]))

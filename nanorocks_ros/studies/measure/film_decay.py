@@ -85,6 +85,8 @@ class DecayStep:
                 'it needs the container: --corners, --sides-mm, --height-mm, and --diameter-mm of '
                 'the beads'
             )
+        if not all(species.counted for species in self.tray.species):
+            return 'it needs the number of beads: --count'
         if self.tray.count < _LEAST_BEADS:
             return f'fewer than {_LEAST_BEADS} beads are no gas that cools'
         if not any(record.cycle > 0 for record in self.records):

@@ -1,6 +1,6 @@
-"""Some frames of a recording, and its frame rate, for what has to be known before an analysis.
+"""Size and frame rate of a recording, and some of its frames.
 
-Tested by ``test/studies/measure/test_film_tray.py``.
+Tested by ``test/studies/measure/test_film_samples.py``.
 """
 
 from __future__ import annotations
@@ -20,26 +20,39 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Frames that are read, and by which factor a later one is farther: beads have moved by then.
-_FRAMES, _STRIDE = 12, 5
+# Frames that are read for size and rate, and kept of the whole film.
+_FIRST, _KEPT = 8, 25
 
 
 class FilmSamples(NamedTuple):
-    """Frames from the beginning of a recording.
+    """What a recording is like.
 
     Parameters
     ----------
-    frames : tuple of ndarray of uint8, (rows, columns, 3), bgr
+    size : tuple of 2 ints, [px]
+        Width and height.
     rate : float, [1/s]
         Frames per second: the inverse of the median interval.
+    frames : tuple of ndarray of uint8, (rows, columns, 3), bgr
+        Spread over the film.
     """
 
-    frames: tuple[NDArray[np.uint8], ...]
+    size: tuple[int, int]
     rate: float
+    frames: tuple[NDArray[np.uint8], ...]
 
 
-def film_samples(path: Path, image_topic: str = '') -> FilmSamples:
-    """Read some frames of a recording.
+def film_samples(path: Path, image_topic: str = '', *, whole: bool = False) -> FilmSamples:
+    """Read frames of a recording.
+
+    Parameters
+    ----------
+    path : Path
+        Of the bag.
+    image_topic : str, optional
+        The camera's topic if it has another name than the graph's.
+    whole : bool
+        Whether frames of the whole film are read; else the first ones, which is faster.
 
     Raises
     ------
@@ -47,21 +60,27 @@ def film_samples(path: Path, image_topic: str = '') -> FilmSamples:
         When it cannot be read, or holds fewer than two frames that can be used.
     """
     bag = BagFrames(path, image_topic)
-    frames, stamps = [], []
+    every = max(1, bag.count // _KEPT) if whole else 1
+    frames: list[NDArray[np.uint8]] = []
+    stamps: list[int] = []
     for number, frame in enumerate(bag.frames()):
         if isinstance(frame, FrameError):
             continue
-        stamps.append(frame.stamp_ns)
-        if number % _STRIDE == 0:
-            image = blue_first(frame)
-            is_gray = image.shape[2] == 1
-            frames.append(
-                np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8) if is_gray else image
-            )
-        if len(frames) == _FRAMES:
+        if len(stamps) < _FIRST:
+            stamps.append(frame.stamp_ns)
+        elif not whole:
             break
+        if number % every == 0:
+            frames.append(_in_colour(blue_first(frame)))
     steps = np.diff(np.array(stamps))
     steps = steps[steps > 0]
     if not steps.size:
         raise RecordingError(bag.where, 'holds fewer than two frames', 'record a longer film')
-    return FilmSamples(tuple(frames), NS / float(np.median(steps)))
+    height, width = frames[0].shape[:2]
+    return FilmSamples((width, height), NS / float(np.median(steps)), tuple(frames))
+
+
+def _in_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    if image.shape[2] == 3:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)

@@ -6,32 +6,18 @@ What is not told is guessed, and a notice says what was guessed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.appearance import AUTO
 from nanorocks_ros.experiment.film_section import FilmSection
-from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 # A bead of unknown size counts as one of the flight: the constants of the stages suit it.
 _NOMINAL_DIAMETER = 2e-3
 # Largest path of a bead between two pictures, in diameters, where nothing is told.
 _MAX_STEP = 2.0
-# Share of the tray that beads side by side may cover, and their number, in each round of counting:
-# the threshold of recognition follows from what is expected.
-_ROUNDS = (0.02, 0.1, 0.5)
-_MAX_BEADS = 2000
-# Counted beads over the most that may be counted, above which a round is repeated with more.
-_NEARLY_ALL = 0.7
 # Largest difference of the scales along both sides, relative.
 _MAX_SKEW = 0.03
 _MM = 1e3
@@ -47,15 +33,16 @@ class FilmedBeads:
     diameter : float or None, [m]
     count : int or None
     density : float or None, [g/cm^3]
-    color_bgr : tuple of 3 floats
-        Of the beads, [gray levels].
+    look, colour : str
+        As ``look:`` and ``colour:`` of a trays file.
     """
 
     diameter_px: float
     diameter: float | None = None
     count: int | None = None
     density: float | None = None
-    color_bgr: tuple[float, float, float] = (90.0, 90.0, 90.0)
+    look: str = AUTO
+    colour: str = AUTO
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,16 +81,14 @@ class DescribedTray:
     notices: tuple[str, ...]
 
 
-def described_tray(
-    filmed: FilmedTray, frames: Sequence[NDArray[np.uint8]], rate: float
-) -> DescribedTray:
+def described_tray(filmed: FilmedTray, size: tuple[int, int], rate: float) -> DescribedTray:
     """The trays file of a film.
 
     Parameters
     ----------
     filmed : FilmedTray
-    frames : sequence of ndarray of uint8, (rows, columns, 3), bgr
-        Some frames of the film, on which beads are counted where nobody did.
+    size : tuple of 2 ints, [px]
+        Width and height of the picture.
     rate : float, [1/s]
         Frames per second.
 
@@ -114,16 +99,9 @@ def described_tray(
     """
     if not filmed.beads:
         raise ConfigurationError('--diameter-px', 'is needed', 'measure a bead in the picture')
-    height, width = frames[0].shape[:2]
-    region = _region(filmed.corners_px, (width, height))
+    region = _region(filmed.corners_px, size)
     scale, scale_notice = _scale(filmed, region)
-    notices = [scale_notice] if scale_notice else []
-    largest = max(beads.diameter_px for beads in filmed.beads) / scale
-    if filmed.height is None:
-        notices.append(
-            f'the height of the container is not told; one layer of beads is assumed, '
-            f'{_MM * largest:.3g} mm; --height-mm sets it'
-        )
+    largest = max(beads.diameter or beads.diameter_px / scale for beads in filmed.beads)
     known = filmed.sides is not None and filmed.height is not None
     section = FilmSection(
         pixels_per_metre=scale,
@@ -136,19 +114,29 @@ def described_tray(
     if known:
         assert filmed.sides is not None
         sides = (*filmed.sides, sides[2])
-    guessed = filmed
-    for share in _ROUNDS:
-        if all(beads.count is not None for beads in filmed.beads):
-            break
-        most = tuple(_most_beads(beads, region, share) for beads in filmed.beads)
-        counts = counted_beads(_text(_with_counts(filmed, most), section, sides), section, frames)
-        guessed = _with_counts(filmed, counts)
-        if all(count < _NEARLY_ALL * limit for count, limit in zip(counts, most, strict=True)):
-            break
-    if guessed != filmed:
-        told = ' and '.join(str(beads.count) for beads in guessed.beads)
-        notices.append(f'the number of beads is not told; {told} are seen; --count sets it')
-    return DescribedTray(text=_text(guessed, section, sides), notices=tuple(notices))
+    notices = [scale_notice, *_guesses(filmed, largest)]
+    return DescribedTray(
+        text=_text(filmed, section, sides),
+        notices=tuple(notice for notice in notices if notice),
+    )
+
+
+def _guesses(filmed: FilmedTray, largest: float) -> list[str]:
+    """What is assumed beside the scale, a line each."""
+    notices = []
+    if filmed.height is None:
+        notices.append(
+            'the height of the container is not told; one layer of beads is assumed, '
+            f'{_MM * largest:.3g} mm; --height-mm sets it'
+            if _is_scale_known(filmed)
+            else 'the height of the container is not told; one layer of beads is assumed'
+        )
+    if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
+        notices.append(
+            'collisions of different beads need their densities; all are taken as alike; '
+            '--density-g-cm3 sets them'
+        )
+    return notices
 
 
 def _is_scale_known(filmed: FilmedTray) -> bool:
@@ -198,58 +186,18 @@ def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float
     )
 
 
-def _most_beads(beads: FilmedBeads, region: tuple[int, int, int, int], share: float) -> int:
-    """The number of beads that cover a share of the tray."""
-    room = share * region[2] * region[3] / (0.25 * math.pi * beads.diameter_px**2)
-    return max(3, min(int(room), _MAX_BEADS))
-
-
-def _with_counts(filmed: FilmedTray, counts: tuple[int, ...]) -> FilmedTray:
-    beads = tuple(
-        told if told.count is not None else replace(told, count=count)
-        for told, count in zip(filmed.beads, counts, strict=True)
-    )
-    return replace(filmed, beads=beads)
-
-
-def counted_beads(
-    text: str, section: FilmSection, frames: Sequence[NDArray[np.uint8]]
-) -> tuple[int, ...]:
-    """The number of beads of each species: the median of those seen in some frames, at least 1.
-
-    Parameters
-    ----------
-    text : str
-        Of a trays file, with at least as many beads.
-    section : FilmSection
-    frames : sequence of ndarray of uint8, (rows, columns, 3), bgr
-    """
-    (tray,) = load_trays(text).values()
-    column, row, width, height = section.region_px
-    detector = BeadDetector(PipelineSettings().tracking, tray, section.pixels_per_metre)
-    seen = [
-        [
-            beads.radii.size
-            for beads in detector.detect(frame[row : row + height, column : column + width])
-        ]
-        for frame in frames
-    ]
-    medians = np.median(np.array(seen), axis=0)
-    return tuple(max(1, round(float(median))) for median in medians)
-
-
 def _text(filmed: FilmedTray, section: FilmSection, sides: tuple[float, float, float]) -> str:
     """The trays file."""
     materials, species = [], []
     for number, beads in enumerate(filmed.beads, start=1):
         name = f'beads_{number}' if len(filmed.beads) > 1 else 'beads'
-        color = ', '.join(f'{level:g}' for level in beads.color_bgr)
         density = 1.0 if beads.density is None else beads.density
-        materials.append(f'  {name}: {{density_g_cm3: {density:g}, color_bgr: [{color}]}}\n')
+        materials.append(f'  {name}: {{density_g_cm3: {density:g}, color_bgr: [90, 90, 90]}}\n')
+        count = '' if beads.count is None else f', count: {beads.count}'
         diameter = beads.diameter or beads.diameter_px / section.pixels_per_metre
         species.append(
-            f'      - {{material: {name}, diameter_mm: {_MM * diameter:.6g}, '
-            f'count: {beads.count}}}\n'
+            f'      - {{material: {name}, diameter_mm: {_MM * diameter:.6g}{count}, '
+            f'look: {beads.look}, colour: "{beads.colour}"}}\n'
         )
     lengths = ', '.join(f'{_MM * side:.6g}' for side in sides)
     return (

@@ -6,6 +6,7 @@ Every step leaves files in the folder of results. A second run takes what it nee
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -169,7 +170,8 @@ def _measured_tray(
     """Everything of one tray."""
     tray, records = tracked.trays[number], tracked.tracks[number]
     film = film_section(plan.settings.trays_file)
-    known = film is None or film.container_known
+    height_known = not math.isnan(tray.dimensions[2])
+    known = height_known and (film is None or film.container_known)
     unit = LengthUnit()
     if film is not None and not film.scale_known:
         unit = LengthUnit('px', film.pixels_per_metre)

@@ -86,6 +86,10 @@ def track_contacts(
     progress : callable, optional
         Called with the frames done and the frames there are.
     """
+    if math.isnan(tray.dimensions[2]):
+        # One layer of beads.
+        layer = max(species.diameter_high for species in tray.species)
+        tray = replace(tray, dimensions=(*tray.dimensions[:2], layer))
     acceleration = steady_acceleration(tracks)
     walls = None
     if not container_known:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
-import numpy as np
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError
@@ -16,42 +14,35 @@ CORNERS = (30.0, 20.0), (330.0, 220.0)
 RATE = 50.0
 
 
-def frames(count):
-    """Frames of dark discs of 20 px on a bright floor with noise."""
-    rng = np.random.default_rng(3)
-    rows, columns = np.divmod(np.arange(count), 6)
-    pictures = []
-    for k in range(6):
-        image = np.full((SIZE[1], SIZE[0], 3), 190, dtype=np.uint8)
-        for row, column in zip(rows, columns, strict=True):
-            place = 50 + 50 * int(column) + 2 * k, 50 + 45 * int(row) + k
-            cv2.circle(image, place, 10, (50, 50, 50), -1, cv2.LINE_AA)
-        noise = rng.normal(0.0, 2.0, image.shape)
-        pictures.append(np.clip(image + noise, 0, 255).astype(np.uint8))
-    return pictures
+def described(filmed):
+    return described_tray(filmed, SIZE, RATE)
 
 
-def described(filmed, count=8):
-    return described_tray(filmed, frames(count), RATE)
-
-
-def test_a_diameter_in_pixels_is_enough_to_count_the_beads():
+def test_a_diameter_in_pixels_is_enough():
     tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0),)))
     (species,) = load_trays(tray.text)[1].species
     section = film_section(tray.text)
-    assert species.count == 8
+    assert not species.counted
+    assert species.appearance.sign == 0
     assert section.region_px == (0, 0, *SIZE)
     assert not section.scale_known
     assert not section.container_known
     assert species.diameter * section.pixels_per_metre == pytest.approx(20.0)
     words = ' '.join(tray.notices)
-    for part in ('8 are seen', '--diameter-mm', '--height-mm'):
+    for part in ('--diameter-mm', 'one layer'):
         assert part in words
 
 
-def test_many_beads_are_counted_too():
-    tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0),)), count=24)
-    assert load_trays(tray.text)[1].species[0].count == 24
+def test_look_and_colour_of_each_species_are_told():
+    beads = (
+        FilmedBeads(diameter_px=20.0, look='bright', count=3),
+        FilmedBeads(diameter_px=30.0, colour='#c03020'),
+    )
+    tray = described(FilmedTray(beads=beads))
+    first, second = load_trays(tray.text)[1].species
+    assert (first.appearance.sign, first.expected) == (1, 3)
+    assert second.appearance.colour == (32.0, 48.0, 192.0)
+    assert 'densities' in ' '.join(tray.notices)
 
 
 def test_a_known_container_gives_the_scale_and_nothing_is_guessed():
