@@ -43,6 +43,7 @@ COMMANDS = {
     'statistics': 'statistics',
     'sweep': 'simulation.sweep',
     'track': 'track',
+    'tray': 'tray',
 }
 """By command, the module of `nanorocks_ros.cli` that adds its parser; in the order of the help."""
 

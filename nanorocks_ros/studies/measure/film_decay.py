@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.records import Tracks
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis
+    from nanorocks_ros.studies.analysis.recognition_verdicts import Verdict
 
 # Points and runs of a library that is made on the way: half of those of `nanorocks library`.
 _NODES, _ROUGH_NODES, _RUNS = 400, 300, 8
@@ -63,8 +64,8 @@ class DecayStep:
     records : sequence of Tracks
         Of all frames.
     container_known : bool
-    usable : bool
-        Whether its beads were recognised.
+    verdicts : tuple of Verdict
+        On its beads.
     settings : PipelineSettings
         For this tray alone.
     """
@@ -72,13 +73,13 @@ class DecayStep:
     tray: Tray
     records: Sequence[Tracks]
     container_known: bool
-    usable: bool
+    verdicts: tuple[Verdict, ...]
     settings: PipelineSettings = field(default_factory=PipelineSettings)
 
     @property
     def reason_against(self) -> str:
         """Why the decay cannot be read; empty when it can."""
-        if not self.usable:
+        if not all(verdict.usable for verdict in self.verdicts):
             return 'the beads are not recognised well enough, see above'
         if not self.container_known:
             return (

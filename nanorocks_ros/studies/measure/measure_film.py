@@ -191,7 +191,7 @@ def _measured_tray(
         tray=tray,
         records=records,
         container_known=known,
-        usable=all(verdict.usable for verdict in tracked.verdicts[number]),
+        verdicts=tracked.verdicts[number],
     )
     decay_lines = _decay_lines(plan, step, teller)
     for line in decay_lines:
@@ -227,7 +227,12 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
         raise
     except NanorocksError as error:
         return [f'decay: not read; {error}']
-    lines = [f'decay: {line}' for line in plan.describe(analysis, number)]
+    said = {line for verdict in step.verdicts for line in verdict.lines()}
+    lines = [
+        f'decay: {line.strip()}'
+        for line in plan.describe(analysis, number)
+        if line.strip() not in said
+    ]
     write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())
     return lines
 
