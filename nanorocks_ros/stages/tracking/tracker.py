@@ -160,7 +160,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         return self._camera.push(self._time(image), places, radii, moved, error)
 
     def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
-        return Linker(
+        linker = Linker(
             species.count,
             (float(shape[1]), float(shape[0])),
             self._settings.max_speed * self._scale,
@@ -172,6 +172,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
                 hidden=self._tray.chalk,
             ),
         )
+        linker.follows_struck_beads = self._tray.is_learnt
+        return linker
 
     def _systematic_error(self, material: Material) -> float:
         if self._tray.chalk:

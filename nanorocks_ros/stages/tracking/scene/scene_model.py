@@ -10,12 +10,16 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.stages.tracking.scene.edge_votes import (
-    Voting,
-    centres_of_all_sizes,
-    find_centres,
+from nanorocks_ros.stages.tracking.scene.disc_measures import (
+    apart,
+    join_outlines,
+    marked_shares,
+    reduced,
+    ring_colours,
 )
+from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
+from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
 from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
 
 if TYPE_CHECKING:
@@ -48,9 +52,6 @@ _LEAST_RADIUS_PX = 4.5
 # Discs of the other brightness count when they are at least this part.
 _OTHER_SIGN_SHARE = 0.4
 _LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
-# Trial radii when nothing is known of the size: smallest, part of the picture, and their ratio.
-_SMALLEST_PX, _LARGEST_SHARE, _RADIUS_RATIO = 2.5, 0.25, 1.3
-_RADIUS_TOLERANCE = 0.2
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
 _MOST_SAMPLES = 400
@@ -169,8 +170,8 @@ class SceneModel:
         if self.knows_background:
             outlines = outlines.chosen(~self._left(color, outlines.discs))
         colours = ring_colours(color, outlines.discs, _INSIDE)
-        moving = _shares(self.colours.moving(color), outlines.discs)
-        return Candidates(_reduced(outlines, self.scale), colours, moving)
+        moving = marked_shares(self.colours.moving(color), outlines.discs)
+        return Candidates(reduced(outlines, self.scale), colours, moving)
 
     def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         if self.scale == 1:
@@ -259,10 +260,10 @@ class SceneModel:
         low, high = (self.scale * radius for radius in self._look.radii)
         noise = self.colours.noise
         view = View(moves, Voting(low, high, sign, 1.0, noise), 0.0)
-        step = _usual_step(view.of(frames[-1], self.colours), noise)
+        step = usual_step(view.of(frames[-1], self.colours), noise)
         voting = view.voting._replace(step=step)
         if not low > 0.0:
-            voting = _searched_radii(view.of(frames[len(frames) // 2], self.colours), voting)
+            voting = search_radii(view.of(frames[len(frames) // 2], self.colours), voting)
         rows = [self._outlines(frame, view._replace(voting=voting)) for frame in frames]
         outlines = join_outlines(rows)
         if len(outlines.steps) == 0:
@@ -294,93 +295,3 @@ def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneMod
         return model
     # The size was found: small beads are seen better enlarged.
     return SceneModel(frames, replace(look, radii=model.radii))
-
-
-def join_outlines(parts: Sequence[Outlines]) -> Outlines:
-    """The circles of all parts."""
-    return Outlines(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-
-
-def _reduced(outlines: Outlines, scale: int) -> Outlines:
-    """Circles of an enlarged picture in the picture itself."""
-    discs = outlines.discs / scale
-    discs[:, :2] -= 0.5 * (scale - 1.0) / scale
-    return outlines._replace(
-        discs=discs, errors=outlines.errors / scale, radius_errors=outlines.radius_errors / scale
-    )
-
-
-def apart(outlines: Outlines) -> NDArray[np.bool_]:
-    """Which discs to keep, so that no two lie on one another; better ones first."""
-    discs = outlines.discs
-    order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
-    keep = np.zeros(len(discs), dtype=bool)
-    if len(discs) == 0:
-        return keep
-    pairs = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], 1.0 * discs[:, 2])
-    taken = np.zeros(len(discs), dtype=bool)
-    for k in order:
-        if not taken[k]:
-            keep[k] = True
-            taken[pairs[k]] = True
-    return keep
-
-
-def ring_colours(
-    color: NDArray[np.uint8], discs: NDArray[np.float64], parts: Sequence[float]
-) -> NDArray[np.float64]:
-    """Median colour of the circles around each centre of these parts of the radius, (n, 3)."""
-    turns = np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False)
-    across = np.outer(parts, np.cos(turns)).ravel()
-    down = np.outer(parts, np.sin(turns)).ravel()
-    columns = np.clip(np.rint(discs[:, :1] + discs[:, 2:] * across), 0, color.shape[1] - 1)
-    rows = np.clip(np.rint(discs[:, 1:2] + discs[:, 2:] * down), 0, color.shape[0] - 1)
-    values = color[rows.astype(np.intp), columns.astype(np.intp)]
-    return np.asarray(np.median(values, axis=1), dtype=np.float64).reshape(len(discs), 3)
-
-
-def _shares(mask: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of the bounding square of each disc in which the mask is 1."""
-    sums = cv2.integral(mask).astype(np.float64)
-    low = np.floor(discs[:, :2] - discs[:, 2:]).astype(np.intp)
-    high = np.ceil(discs[:, :2] + discs[:, 2:]).astype(np.intp) + 1
-    limits = np.array([mask.shape[1], mask.shape[0]])
-    low, high = np.clip(low, 0, limits), np.clip(high, 0, limits)
-    inside = (
-        sums[high[:, 1], high[:, 0]]
-        - sums[low[:, 1], high[:, 0]]
-        - sums[high[:, 1], low[:, 0]]
-        + sums[low[:, 1], low[:, 0]]
-    )
-    return np.asarray(inside / np.maximum((high - low).prod(axis=1), 1))
-
-
-def _usual_step(picture: NDArray[np.uint8], noise: float) -> float:
-    """Step of a strong edge of the picture, where beads are not yet known."""
-    across = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)
-    down = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)
-    size = cv2.magnitude(across, down)
-    edges = size[size > max(2.0 * noise, 1.0)]
-    # An edge spreads over about three pixels.
-    return max(3.0 * float(np.quantile(edges, 0.8)) if edges.size else 0.0, 4.0 * noise, 4.0)
-
-
-def _searched_radii(picture: NDArray[np.uint8], start: Voting) -> Voting:
-    """With smallest and largest radius of the discs that cover most of the outlines."""
-    largest = _LARGEST_SHARE * min(picture.shape)
-    count = max(1, math.ceil(math.log(largest / _SMALLEST_PX) / math.log(_RADIUS_RATIO)))
-    best, chosen = 0.0, start._replace(smallest=_SMALLEST_PX, largest=largest)
-    for k in range(count):
-        middle = _SMALLEST_PX * _RADIUS_RATIO ** (k + 0.5)
-        ratio = math.sqrt(_RADIUS_RATIO)
-        voting = start._replace(smallest=middle / ratio, largest=middle * ratio)
-        centres = find_centres(picture, voting, 2.0 * _LEAST_VOTES)
-        outlines = fit_outlines(picture, centres[:, :3], voting)
-        outlines = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
-        outlines = outlines.chosen(apart(outlines))
-        evidence = float((outlines.support**2 * outlines.discs[:, 2] * outlines.steps).sum())
-        if evidence > best:
-            radius = float(np.median(outlines.discs[:, 2]))
-            low, high = radius * (1.0 - _RADIUS_TOLERANCE), radius * (1.0 + _RADIUS_TOLERANCE)
-            best, chosen = evidence, start._replace(smallest=low, largest=high)
-    return chosen
