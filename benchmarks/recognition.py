@@ -2,8 +2,8 @@
 
 ``python -m benchmarks recognition`` draws scenes, by a painter that shares no code with the
 package, and prints recall and precision with the diameter told and with nothing told.
-``python -m benchmarks.recognition CLIP DIAMETER_PX [PICTURE]`` counts discs in a video or folder of
-pictures; `scripts/fetch_clips` says where some that may be used come from.
+``python -m benchmarks.recognition CLIP DIAMETER_PX [PICTURE]`` counts discs in a video;
+`benchmarks/clips.md` says where some that may be used come from.
 """
 
 from __future__ import annotations

@@ -103,6 +103,10 @@ def track_bag(
     lessons = scene_frames(path, settings, image_topic=image_topic, progress=progress)
     for number, frames in lessons.items():
         trackers[number].learn(frames)
+    counters = {
+        number: RecognitionCounter(images.trays[number], crowded=tracker.crowded)
+        for number, tracker in trackers.items()
+    }
     bag = TrackedBag(
         epoch_ns=images.epoch_ns,
         pixels_per_metre=settings.preprocess.pixels_per_metre,
@@ -116,6 +120,7 @@ def track_bag(
             bag.pictures[image.tray] = image
             for tracks in trackers[image.tray].push(image):
                 bag.tracks[image.tray].append(tracks)
+                counters[image.tray].push(tracks, trackers[image.tray].max_speed)
                 bag.numbers[image.tray].append(shot.number)
     bag.frames = images.frames
     bag.regions = images.stage.regions
@@ -123,19 +128,9 @@ def track_bag(
     if not any(bag.tracks.values()):
         raise _without_colour(images.bag.where)
     bag.verdicts = {
-        number: _verdicts(bag, number, settings.tracking.max_speed, tracker)
-        for number, tracker in trackers.items()
+        number: recognition_verdicts(counter.counts()) for number, counter in counters.items()
     }
     return bag
-
-
-def _verdicts(
-    bag: TrackedBag, number: int, max_speed: float, tracker: Tracker
-) -> tuple[Verdict, ...]:
-    counter = RecognitionCounter(bag.trays[number], max_speed, crowded=tracker.crowded)
-    for tracks in bag.tracks[number]:
-        counter.push(tracks)
-    return recognition_verdicts(counter.counts())
 
 
 def _without_colour(where: str) -> FrameError:

@@ -54,6 +54,7 @@ class Linker:
 
     Attributes
     ----------
+    max_speed : float, [px/s]
     follows_struck_beads : bool
         Whether a lone bead keeps its number when it is struck, however slow the others are.
     """
@@ -70,7 +71,7 @@ class Linker:
         self.follows_struck_beads = False
         self._deviations = deviations
         self._size = np.array(size)
-        self._max_speed = max_speed
+        self.max_speed = max_speed
         self._settings = LinkSettings(expected, memory, window)
         self._speed = 0.0
         self._started = False
@@ -123,9 +124,9 @@ class Linker:
         )
         velocity_change = max(_COLLISION_FACTOR * self._speed, MIN_VELOCITY_CHANGE_PX_S)
         known_beads = KnownBeads(positions, variances, last_positions, time - last_seen, radii)
-        links = link_detections(known_beads, detected, velocity_change, self._max_speed)
+        links = link_detections(known_beads, detected, velocity_change, self.max_speed)
         if self.follows_struck_beads:
-            links = link_struck_beads(links, known_beads, detected, self._max_speed)
+            links = link_struck_beads(links, known_beads, detected, self.max_speed)
         self._grow(n_tracks, detections.radii.size)
         self._n_tracks, n_new, self._speed = update_tracks(
             self._tracks,
