@@ -34,10 +34,10 @@ _GOOD_SUPPORT = 0.7
 _MOVING_SHARE = 0.15
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 6, 0.1
-# A background is known where not more than this share of the pixels differs from it.
-_BACKGROUND_SHARE = 0.3
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
+# And above so many gray levels, and times the noise.
+_LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
 # Circles inside and outside a disc, in radii; and how much more contrast the background has where
 # a bead has left.
 _INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
@@ -76,10 +76,11 @@ class BeadLook:
 
 
 class Candidates(NamedTuple):
-    """Discs found in a frame: outlines, colour inside (n, 3), and share of the disc that moves."""
+    """Discs in a frame: outlines, colours inside and around (n, 3), share of each that moves."""
 
     outlines: Outlines
     colours: NDArray[np.float64]
+    around: NDArray[np.float64]
     moving: NDArray[np.float64]
 
 
@@ -122,8 +123,6 @@ class SceneModel:
     views : list of View
     sees_motion : bool
         Whether discs that move told what beads look like.
-    knows_background : bool
-        Whether few enough pixels move to know what is behind the beads.
     """
 
     def __init__(self, frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> None:
@@ -167,11 +166,12 @@ class SceneModel:
             [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
         )
         outlines = outlines.chosen(apart(outlines))
-        if self.knows_background:
+        if self.colours.knows_background:
             outlines = outlines.chosen(~self._left(color, outlines.discs))
         colours = ring_colours(color, outlines.discs, _INSIDE)
+        around = ring_colours(color, outlines.discs, _OUTSIDE)
         moving = marked_shares(self.colours.moving(color), outlines.discs)
-        return Candidates(reduced(outlines, self.scale), colours, moving)
+        return Candidates(reduced(outlines, self.scale), colours, around, moving)
 
     def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         if self.scale == 1:
@@ -191,13 +191,15 @@ class SceneModel:
 
     def alike(self, candidates: Candidates) -> NDArray[np.bool_]:
         """Which of the discs look like beads."""
+        brighter = (candidates.colours - candidates.around).sum(axis=1)
+        told = self._look.sign * brighter >= 0.0
         if self._known is None:
-            return np.ones(len(candidates.moving), dtype=bool)
+            return np.asarray(told)
         # Not the nearest: what was taken for a bead by mistake is known, too.
         nearest = max(1, round(_KNOWN_SHARE * self._known.n))
         distances = self._known.query(self._features(candidates), k=[nearest])[0][:, 0]
         rest = candidates.moving < _MOVING_SHARE
-        return np.asarray(distances < np.where(rest, _ALIKE, _ALIKE_MOVING))
+        return np.asarray(told & (distances < np.where(rest, _ALIKE, _ALIKE_MOVING)))
 
     def _outlines(
         self, color: NDArray[np.uint8], view: View, hints: NDArray[np.float64] | None = None
@@ -210,14 +212,13 @@ class SceneModel:
         outlines = fit_outlines(picture, starts, view.voting)
         steps = outlines.steps / view.voting.step
         good = (outlines.support >= LEAST_SUPPORT) & (steps >= _LEAST_STEP)
+        good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * self.colours.noise)
         return outlines._replace(steps=steps).chosen(good)
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
-        shares = [self.colours.moving(self._enlarged(frame)).mean() for frame in frames]
         chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
-        self.knows_background = len(frames) > 2 and bool(np.mean(shares) < _BACKGROUND_SHARE)
         self.views = self._plain_views(chosen)
-        if self.knows_background:
+        if self.colours.knows_background:
             self.views.append(self._view(chosen, moves=True, sign=1))
         if not self._look.radii[0] > 0.0:
             # What moves tells the size first.
@@ -230,8 +231,7 @@ class SceneModel:
         rows = [self.candidates(frame) for frame in frames]
         every = Candidates(
             join_outlines([row.outlines for row in rows]),
-            np.concatenate([row.colours for row in rows]),
-            np.concatenate([row.moving for row in rows]),
+            *(np.concatenate([row[k] for row in rows]) for k in (1, 2, 3)),
         )
         good = every.outlines.support >= _GOOD_SUPPORT
         moving = good & (every.moving >= _MOVING_SHARE)
@@ -247,7 +247,7 @@ class SceneModel:
         signs = (1, -1) if self._look.sign == 0 else (self._look.sign,)
         views = [self._view(frames, moves=False, sign=sign) for sign in signs]
         views.sort(key=lambda view: -view.evidence)
-        if not self.knows_background:
+        if not self.colours.knows_background:
             return views[:1]
         return [
             view

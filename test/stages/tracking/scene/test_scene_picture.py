@@ -46,7 +46,7 @@ def test_the_colours_tell_beads_from_floor_of_the_same_lightness(film):
 
 def test_the_noise_is_that_of_a_pixel(film):
     colours = scene_colours(film[0])
-    assert colours.noise == pytest.approx(3.0 * np.linalg.norm(colours.weights), rel=0.15)
+    assert colours.noise == pytest.approx(3.0 * np.linalg.norm(colours.weights), rel=0.25)
 
 
 def test_pixels_that_differ_from_the_background_move(film):
