@@ -24,6 +24,7 @@ ALL = (
     'scene',
     'drawn_cameras',
     'tracking',
+    'recognition',
     'plate_cost',
     'recorder',
     'foreign_world',

@@ -77,7 +77,7 @@ def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...
             '--diameter-px', 'and --trays-file both describe the beads', 'leave out one of them'
         )
     samples = film_samples(bag, options.image_topic)
-    tray = described_tray(filmed, samples.size, samples.rate)
+    tray = described_tray(filmed, samples.size)
     options.trays_file = tray.text
     return tray.notices
 

@@ -78,11 +78,11 @@ def run(options: argparse.Namespace) -> int:
     assert filmed is not None
     if options.bead and len(options.bead) > 1 and not options.colour:
         filmed = _coloured(filmed, options.bead, samples)
-    tray = described_tray(filmed, samples.size, samples.rate)
+    tray = described_tray(filmed, samples.size)
     beads = seen_beads(tray.text, samples.frames)
     counted, notice = _with_counts(filmed, beads)
     if notice:
-        tray = described_tray(counted, samples.size, samples.rate)
+        tray = described_tray(counted, samples.size)
     print_notices((*guesses, *tray.notices, *notice))
     write_bytes(Path(options.output), tray.text.encode())
     if options.picture:

@@ -34,15 +34,12 @@ class FilmSection(NamedTuple):
     container_known : bool
         Whether the tray is the container of the beads, with its height; else it is the whole
         picture.
-    max_speed : float, [m/s]
-        Largest speed of a bead when linking.
     """
 
     pixels_per_metre: float
     region_px: tuple[int, int, int, int]
     scale_known: bool = True
     container_known: bool = True
-    max_speed: float = 0.0
 
     def settings(self) -> dict[str, Any]:
         """Settings of the pipeline by name that follow."""
@@ -50,8 +47,6 @@ class FilmSection(NamedTuple):
             'preprocess.pixels_per_metre': self.pixels_per_metre,
             'preprocess.regions_px': list(self.region_px),
         }
-        if self.max_speed:
-            values['tracking.max_speed'] = self.max_speed
         if not self.container_known:
             # There are no walls to compare with, or to register by.
             values |= {'preprocess.stabilise': False, 'preprocess.check_tray_positions': False}
@@ -63,8 +58,7 @@ class FilmSection(NamedTuple):
         return (
             f'{SECTION}: {{pixels_per_metre: {self.pixels_per_metre:.8g}, region_px: [{region}], '
             f'scale: {_KNOWN if self.scale_known else _ASSUMED}, '
-            f'container: {_KNOWN if self.container_known else _ASSUMED}, '
-            f'max_speed: {self.max_speed:.4g}}}\n'
+            f'container: {_KNOWN if self.container_known else _ASSUMED}}}\n'
         )
 
 
@@ -96,9 +90,7 @@ class _SectionFile(YamlLines):
     """The section from its node."""
 
     def section(self, node: yaml.Node) -> FilmSection:
-        entry = self.mapping(
-            node, {'pixels_per_metre', 'region_px'}, {'scale', 'container', 'max_speed'}
-        )
+        entry = self.mapping(node, {'pixels_per_metre', 'region_px'}, {'scale', 'container'})
         region = [self.number(item) for item in self.listed(entry['region_px'])]
         if len(region) != 4 or min(region) < 0 or any(value % 1 for value in region):
             raise self.error(
@@ -107,13 +99,11 @@ class _SectionFile(YamlLines):
                 'give column, row, width and height in whole pixels',
             )
         column, row, width, height = (int(value) for value in region)
-        speed = entry.get('max_speed')
         return FilmSection(
             pixels_per_metre=self.positive(entry['pixels_per_metre']),
             region_px=(column, row, width, height),
             scale_known=self._known(entry.get('scale')),
             container_known=self._known(entry.get('container')),
-            max_speed=0.0 if speed is None else self.number(speed),
         )
 
     def _known(self, node: yaml.Node | None) -> bool:

@@ -104,9 +104,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         if self._lesson:
             self._tracker.learn(self._lesson)
         drag = Measured(settings.prior.drag, settings.prior.drag_error)
-        self.recognition = RecognitionCounter(
-            tray, settings.tracking.max_speed, crowded=self._tracker.crowded
-        )
+        self.recognition = RecognitionCounter(tray, crowded=self._tracker.crowded)
         self._contacts = ContactFinder(tray, drag)
         self._bodies = BodyCounter(settings, tray)
         self._scale = ScaleCheck(settings, tray)
@@ -137,7 +135,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             speeds += self._track_speed.push(image)
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
-                self.recognition.push(tracks)
+                self.recognition.push(tracks, self._tracker.max_speed)
                 notices += self._camera_notices(image, tracks)
                 contacts = self._contacts_in(tracks)
                 notices += self._scale_notices(tracks, contacts)

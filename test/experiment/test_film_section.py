@@ -18,7 +18,7 @@ trays:
     species:
       - {material: beads, diameter_mm: 2, count: 24}
 """
-SECTION = FilmSection(12000.0, (56, 50, 720, 480), True, False, 0.12)
+SECTION = FilmSection(12000.0, (56, 50, 720, 480), True, False)
 
 
 def test_a_section_reads_as_it_was_written_and_trays_ignore_it():
@@ -35,7 +35,6 @@ def test_the_settings_of_a_recording_follow_from_the_file_alone():
     assert result.settings.trays == (3,)
     assert result.settings.preprocess.regions_px == (56, 50, 720, 480)
     assert result.settings.preprocess.pixels_per_metre == 12000.0
-    assert result.settings.tracking.max_speed == 0.12
     assert not result.settings.preprocess.stabilise
 
 
@@ -43,12 +42,10 @@ def test_what_is_told_replaces_the_section():
     values = {
         'trays_file': SECTION.text() + TRAY,
         'preprocess.pixels_per_metre': 9000.0,
-        'tracking.max_speed': 1.0,
     }
     settings = with_values(PipelineSettings(), values, 'test')
     result = recorded_settings(settings, set(values), {}, 'bag').settings
     assert result.preprocess.pixels_per_metre == 9000.0
-    assert result.tracking.max_speed == 1.0
     assert result.preprocess.regions_px == (56, 50, 720, 480)
 
 

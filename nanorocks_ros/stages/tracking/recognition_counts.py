@@ -83,15 +83,13 @@ class RecognitionCounter:
     Parameters
     ----------
     tray : Tray
-    max_speed : float, [m/s]
-        Largest speed at which beads are linked.
     crowded : bool
         Whether some of the species are not tracked, since their grains are too many.
     """
 
-    def __init__(self, tray: Tray, max_speed: float, *, crowded: bool = False) -> None:
+    def __init__(self, tray: Tray, *, crowded: bool = False) -> None:
         self._tray = tray
-        self._max_speed = max_speed
+        self._max_speed = 0.0
         self._crowded = crowded
         self._frames = 0
         self._wrong_scale = 0
@@ -99,14 +97,22 @@ class RecognitionCounter:
             _SpeciesCounter(_least_distance(tray, k)) for k in range(len(tray.species))
         ]
 
-    def push(self, tracks: Tracks) -> None:
-        """Count the tracks of an image."""
+    def push(self, tracks: Tracks, max_speed: float) -> None:
+        """Count the tracks of an image.
+
+        Parameters
+        ----------
+        tracks : Tracks
+        max_speed : float, [m/s]
+            Largest speed at which beads were linked.
+        """
+        self._max_speed = max(self._max_speed, max_speed)
         self._frames += 1
         self._wrong_scale += Quality.WRONG_SCALE in tracks.quality
         for k, (counter, species) in enumerate(
             zip(self._species, self._tray.species, strict=True)
         ):
-            counter.push(tracks, tracks.species == k, species.count, self._max_speed)
+            counter.push(tracks, tracks.species == k, species.count, max_speed)
 
     def counts(self) -> tuple[SpeciesCounts, ...]:
         """What was counted so far, for each species; empty before the first image."""

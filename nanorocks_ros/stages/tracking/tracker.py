@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.stages.tracking.camera_motion import TrayMotion
+    from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
 
 _NS = 1e9
 # Visible share of a species below which speeds and counts are unreliable.
@@ -37,6 +38,10 @@ _MIN_VISIBLE_SHARE = 0.85
 # Systematic error of a position in a tray with grains too crowded to track, [px]. It is the same
 # in successive frames and does not affect velocities.
 _CROWDED_PX = 0.6
+# Largest speed of beads of the flight, [m/s]; and largest step of others over the distance of
+# neighbours.
+_FLIGHT_MAX_SPEED = 0.05
+_NEIGHBOUR_SHARE = 0.5
 
 
 class Tracker(RestartingStage[TrayImage, Tracks]):
@@ -70,6 +75,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         self._linkers: list[Linker] = []
         self._first_ns: int | None = None
         self._next_id = 0
+        self._own_max_speed = _FLIGHT_MAX_SPEED
+        self._last_time = math.nan
 
     def learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
         """Learn the look of the beads from frames of the whole film, where it is not known.
@@ -89,6 +96,23 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         if self._lesson:
             detector.learn(self._lesson)
         return detector
+
+    @property
+    def max_speed(self) -> float:
+        """Largest speed at which beads are linked, [m/s]."""
+        return self._settings.max_speed or self._own_max_speed
+
+    def _update_max_speed(self, time: float, detected: Sequence[Detections]) -> None:
+        """Of beads that are learnt: half of the distance of neighbours between two frames."""
+        count = sum(detections.radii.size for detections in detected)
+        interval, self._last_time = time - self._last_time, time
+        if not self._tray.is_learnt or count == 0 or not interval > 0.0:
+            return
+        spacing = math.sqrt(math.prod(self._tray.dimensions[:2]) / count)
+        reach = max(_NEIGHBOUR_SHARE * spacing, self._tray.species[0].diameter_low)
+        self._own_max_speed = reach / interval
+        for linker in self._linkers:
+            linker.max_speed = self.max_speed * self._scale
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:
@@ -130,6 +154,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             self._linkers = [
                 self._linker_of(species, record.gray.shape) for species in self._tray.species
             ]
+        self._update_max_speed(time, detected)
         shift = motion.displacement
         for linker, detections in zip(self._linkers, detected, strict=True):
             errors = np.hypot(detections.position_errors, registration)
@@ -160,10 +185,10 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         return self._camera.push(self._time(image), places, radii, moved, error)
 
     def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
-        return Linker(
+        linker = Linker(
             species.count,
             (float(shape[1]), float(shape[0])),
-            self._settings.max_speed * self._scale,
+            self.max_speed * self._scale,
             self._settings.memory,
             self._settings.window,
             FlightDeviations(
@@ -172,6 +197,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
                 hidden=self._tray.chalk,
             ),
         )
+        linker.follows_struck_beads = self._tray.is_learnt
+        return linker
 
     def _systematic_error(self, material: Material) -> float:
         if self._tray.chalk:

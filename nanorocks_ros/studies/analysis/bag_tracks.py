@@ -107,6 +107,10 @@ def track_bag(
     lessons = scene_frames(path, settings, image_topic=image_topic, progress=progress)
     for number, frames in lessons.items():
         trackers[number].learn(frames)
+    counters = {
+        number: RecognitionCounter(images.trays[number], crowded=tracker.crowded)
+        for number, tracker in trackers.items()
+    }
     bag = TrackedBag(
         epoch_ns=images.epoch_ns,
         pixels_per_metre=settings.preprocess.pixels_per_metre,
@@ -121,44 +125,17 @@ def track_bag(
             bag.pictures[image.tray] = image
             for tracks in trackers[image.tray].push(image):
                 bag.tracks[image.tray].append(tracks)
+                counters[image.tray].push(tracks, trackers[image.tray].max_speed)
                 bag.numbers[image.tray].append(shot.number)
     bag.frames = images.frames
     bag.regions = images.stage.regions
     bag.notices = images.notices
     if not any(bag.tracks.values()):
         raise _without_colour(images.bag.where)
-    crowded = {number for number, tracker in trackers.items() if tracker.crowded}
-    return recognised(bag, settings, frozenset(crowded))
-
-
-def recognised(
-    bag: TrackedBag, settings: PipelineSettings, crowded: frozenset[int] = frozenset()
-) -> TrackedBag:
-    """The bag with a verdict on each species of each tray.
-
-    Parameters
-    ----------
-    bag : TrackedBag
-        Changed.
-    settings : PipelineSettings
-    crowded : frozenset of int
-        Trays with too many grains to be tracked.
-    """
-    max_speed = settings.tracking.max_speed
     bag.verdicts = {
-        number: _verdicts(bag, number, max_speed, crowded=number in crowded)
-        for number in bag.trays
+        number: recognition_verdicts(counter.counts()) for number, counter in counters.items()
     }
     return bag
-
-
-def _verdicts(
-    bag: TrackedBag, number: int, max_speed: float, *, crowded: bool
-) -> tuple[Verdict, ...]:
-    counter = RecognitionCounter(bag.trays[number], max_speed, crowded=crowded)
-    for tracks in bag.tracks[number]:
-        counter.push(tracks)
-    return recognition_verdicts(counter.counts())
 
 
 def _without_colour(where: str) -> FrameError:

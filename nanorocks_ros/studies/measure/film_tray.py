@@ -16,8 +16,6 @@ from nanorocks_ros.experiment.film_section import FilmSection
 
 # A bead of unknown size counts as one of the flight: the constants of the stages suit it.
 _NOMINAL_DIAMETER = 2e-3
-# Largest path of a bead between two pictures, in diameters, where nothing is told.
-_MAX_STEP = 2.0
 # Largest difference of the scales along both sides, relative.
 _MAX_SKEW = 0.03
 _MM = 1e3
@@ -81,7 +79,7 @@ class DescribedTray:
     notices: tuple[str, ...]
 
 
-def described_tray(filmed: FilmedTray, size: tuple[int, int], rate: float) -> DescribedTray:
+def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
     """The trays file of a film.
 
     Parameters
@@ -89,8 +87,6 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int], rate: float) -> De
     filmed : FilmedTray
     size : tuple of 2 ints, [px]
         Width and height of the picture.
-    rate : float, [1/s]
-        Frames per second.
 
     Raises
     ------
@@ -108,7 +104,6 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int], rate: float) -> De
         region_px=region,
         scale_known=_is_scale_known(filmed),
         container_known=known and bool(filmed.corners_px),
-        max_speed=_MAX_STEP * largest * rate,
     )
     sides = (region[2] / scale, region[3] / scale, max(filmed.height or 0.0, largest))
     if known:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, recognised, track_bag
+from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
 from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
@@ -147,7 +147,7 @@ def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
     tracked = saved_tracks(archive, plan.settings, key)
     if tracked is not None and (plan.folder / _PICTURE).exists():
         teller.say(f'tracks: those of an earlier run, {archive}')
-        return recognised(tracked, plan.settings)
+        return tracked
     with teller.progress('tracking') as progress:
         tracked = track_bag(
             plan.bag, plan.settings, image_topic=plan.image_topic, progress=progress

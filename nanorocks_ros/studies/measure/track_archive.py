@@ -16,8 +16,10 @@ from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.recordings.bag.fingerprint import file_states
 from nanorocks_ros.records import Quality, Tracks
+from nanorocks_ros.records.result_words import FlagWords
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
+from nanorocks_ros.studies.analysis.recognition_verdicts import Verdict, verdict_as_json
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,6 +67,11 @@ def save_tracks(path: Path, tracked: TrackedBag, key: str) -> None:
         'frames': np.array(tracked.frames),
         'epoch_ns': np.array(tracked.epoch_ns),
         'notices': np.array(tracked.notices, dtype=np.str_),
+        'verdicts': np.array(
+            json.dumps(
+                [verdict_as_json(row) for told in tracked.verdicts.values() for row in told]
+            )
+        ),
     }
     for number, records in tracked.tracks.items():
         prefix = f'tray_{number}.'
@@ -84,7 +91,7 @@ def save_tracks(path: Path, tracked: TrackedBag, key: str) -> None:
 def saved_tracks(path: Path, settings: PipelineSettings, key: str) -> TrackedBag | None:
     """The tracks of a file; None unless it was made with this key.
 
-    Pictures and verdicts are not among them.
+    Pictures are not among them.
     """
     try:
         arrays = read_archive(path)
@@ -106,10 +113,20 @@ def saved_tracks(path: Path, settings: PipelineSettings, key: str) -> TrackedBag
                 number: Region(*arrays[f'tray_{number}.region'].tolist()) for number in trays
             },
             film=film_section(settings.trays_file),
+            verdicts=_verdicts(str(arrays['verdicts']), list(trays)),
         )
-    except (RecordingError, KeyError, ValueError, IndexError):
+    except (RecordingError, KeyError, ValueError, IndexError, TypeError):
         # A file that is missing, damaged, or of another version is made again.
         return None
+
+
+def _verdicts(text: str, trays: list[int]) -> dict[int, tuple[Verdict, ...]]:
+    """Verdicts by tray, as `verdict_as_json` tells them."""
+    told = [
+        Verdict(**{**values, 'flags': tuple(FlagWords(**flag) for flag in values['flags'])})
+        for values in json.loads(text)
+    ]
+    return {number: tuple(row for row in told if row.tray == number) for number in trays}
 
 
 def _tracks(arrays: dict[str, NDArray[Any]], number: int, counts: list[int]) -> list[Tracks]:

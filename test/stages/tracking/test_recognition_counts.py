@@ -44,14 +44,14 @@ def lattice(count, spacing=2.5 * RADIUS):
 
 
 def counts_of(records, tray=TRAY):
-    counter = RecognitionCounter(tray, MAX_SPEED)
+    counter = RecognitionCounter(tray)
     for tracks in records:
-        counter.push(tracks)
+        counter.push(tracks, MAX_SPEED)
     return counter.counts()[0]
 
 
 def test_nothing_is_counted_before_the_first_image():
-    assert RecognitionCounter(TRAY, MAX_SPEED).counts() == ()
+    assert RecognitionCounter(TRAY).counts() == ()
 
 
 def test_beads_that_move_are_seen_and_not_at_rest():

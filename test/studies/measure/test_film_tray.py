@@ -11,11 +11,10 @@ from nanorocks_ros.studies.measure.film_tray import FilmedBeads, FilmedTray, des
 
 SIZE = 360, 240
 CORNERS = (30.0, 20.0), (330.0, 220.0)
-RATE = 50.0
 
 
 def described(filmed):
-    return described_tray(filmed, SIZE, RATE)
+    return described_tray(filmed, SIZE)
 
 
 def test_a_diameter_in_pixels_is_enough():

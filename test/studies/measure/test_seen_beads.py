@@ -31,7 +31,7 @@ def test_beads_are_counted_by_species_and_drawn():
         for place in ((40.0, 45.0), (90.0, 45.0))
     )
     assert beads[0].colour.startswith('#b')
-    text = described_tray(FilmedTray(beads=beads), SIZE, 30.0).text
+    text = described_tray(FilmedTray(beads=beads), SIZE).text
     seen = seen_beads(text, frames)
     assert seen.counts == (5.0, 5.0)
     assert min(seen.steady) > 0.8

@@ -7,11 +7,14 @@ from bead_paths import PIXEL, RATE, tracks_of
 
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records.result_words import FlagWords
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
+from nanorocks_ros.studies.analysis.recognition_verdicts import Verdict
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
 
 SETTINGS = PipelineSettings()
+FLAG = FlagWords('nothing_seen', 'text', 'remedy')
 
 
 def tracked():
@@ -31,6 +34,7 @@ def tracked():
         frames=15,
         notices=['a bad frame'],
         regions={1: Region(1, 2, 30, 40)},
+        verdicts={1: (Verdict(tray=1, material='a', text='b', usable=False, flags=(FLAG,)),)},
     )
 
 
@@ -41,6 +45,8 @@ def test_tracks_come_back_as_they_were(tmp_path):
     assert (again.frames, again.epoch_ns, again.notices) == (15, 5, ['a bad frame'])
     assert again.regions == bag.regions
     assert again.numbers == bag.numbers
+    assert again.verdicts == bag.verdicts
+    assert not again.usable
     assert len(again.tracks[1]) == 14
     for before, after in zip(bag.tracks[1], again.tracks[1], strict=True):
         assert before.stamp_ns == after.stamp_ns

@@ -131,7 +131,9 @@ class SceneDetector:
         candidates = model.candidates(color, hints)
         outlines = candidates.outlines
         distances = self._colour_distances(candidates.colours)
-        alike = model.alike(candidates) & (np.argmin(distances, axis=1) == k)
+        # Nearer to the colour that is told than what is around it.
+        nearer = distances[:, k] <= self._colour_distances(candidates.around)[:, k]
+        alike = model.alike(candidates) & nearer & (np.argmin(distances, axis=1) == k)
         alike &= self._is_allowed(outlines.discs, color.shape)
         found = _Found(
             outlines.discs,

@@ -10,12 +10,16 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.stages.tracking.scene.edge_votes import (
-    Voting,
-    centres_of_all_sizes,
-    find_centres,
+from nanorocks_ros.stages.tracking.scene.disc_measures import (
+    apart,
+    join_outlines,
+    marked_shares,
+    reduced,
+    ring_colours,
 )
+from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
+from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
 from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
 
 if TYPE_CHECKING:
@@ -30,10 +34,10 @@ _GOOD_SUPPORT = 0.7
 _MOVING_SHARE = 0.15
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 6, 0.1
-# A background is known where not more than this share of the pixels differs from it.
-_BACKGROUND_SHARE = 0.3
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
+# And above so many gray levels, and times the noise.
+_LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
 # Circles inside and outside a disc, in radii; and how much more contrast the background has where
 # a bead has left.
 _INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
@@ -48,9 +52,6 @@ _LEAST_RADIUS_PX = 4.5
 # Discs of the other brightness count when they are at least this part.
 _OTHER_SIGN_SHARE = 0.4
 _LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
-# Trial radii when nothing is known of the size: smallest, part of the picture, and their ratio.
-_SMALLEST_PX, _LARGEST_SHARE, _RADIUS_RATIO = 2.5, 0.25, 1.3
-_RADIUS_TOLERANCE = 0.2
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
 _MOST_SAMPLES = 400
@@ -75,10 +76,11 @@ class BeadLook:
 
 
 class Candidates(NamedTuple):
-    """Discs found in a frame: outlines, colour inside (n, 3), and share of the disc that moves."""
+    """Discs in a frame: outlines, colours inside and around (n, 3), share of each that moves."""
 
     outlines: Outlines
     colours: NDArray[np.float64]
+    around: NDArray[np.float64]
     moving: NDArray[np.float64]
 
 
@@ -121,8 +123,6 @@ class SceneModel:
     views : list of View
     sees_motion : bool
         Whether discs that move told what beads look like.
-    knows_background : bool
-        Whether few enough pixels move to know what is behind the beads.
     """
 
     def __init__(self, frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> None:
@@ -166,11 +166,12 @@ class SceneModel:
             [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
         )
         outlines = outlines.chosen(apart(outlines))
-        if self.knows_background:
+        if self.colours.knows_background:
             outlines = outlines.chosen(~self._left(color, outlines.discs))
         colours = ring_colours(color, outlines.discs, _INSIDE)
-        moving = _shares(self.colours.moving(color), outlines.discs)
-        return Candidates(_reduced(outlines, self.scale), colours, moving)
+        around = ring_colours(color, outlines.discs, _OUTSIDE)
+        moving = marked_shares(self.colours.moving(color), outlines.discs)
+        return Candidates(reduced(outlines, self.scale), colours, around, moving)
 
     def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         if self.scale == 1:
@@ -190,13 +191,15 @@ class SceneModel:
 
     def alike(self, candidates: Candidates) -> NDArray[np.bool_]:
         """Which of the discs look like beads."""
+        brighter = (candidates.colours - candidates.around).sum(axis=1)
+        told = self._look.sign * brighter >= 0.0
         if self._known is None:
-            return np.ones(len(candidates.moving), dtype=bool)
+            return np.asarray(told)
         # Not the nearest: what was taken for a bead by mistake is known, too.
         nearest = max(1, round(_KNOWN_SHARE * self._known.n))
         distances = self._known.query(self._features(candidates), k=[nearest])[0][:, 0]
         rest = candidates.moving < _MOVING_SHARE
-        return np.asarray(distances < np.where(rest, _ALIKE, _ALIKE_MOVING))
+        return np.asarray(told & (distances < np.where(rest, _ALIKE, _ALIKE_MOVING)))
 
     def _outlines(
         self, color: NDArray[np.uint8], view: View, hints: NDArray[np.float64] | None = None
@@ -209,14 +212,13 @@ class SceneModel:
         outlines = fit_outlines(picture, starts, view.voting)
         steps = outlines.steps / view.voting.step
         good = (outlines.support >= LEAST_SUPPORT) & (steps >= _LEAST_STEP)
+        good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * self.colours.noise)
         return outlines._replace(steps=steps).chosen(good)
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
-        shares = [self.colours.moving(self._enlarged(frame)).mean() for frame in frames]
         chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
-        self.knows_background = len(frames) > 2 and bool(np.mean(shares) < _BACKGROUND_SHARE)
         self.views = self._plain_views(chosen)
-        if self.knows_background:
+        if self.colours.knows_background:
             self.views.append(self._view(chosen, moves=True, sign=1))
         if not self._look.radii[0] > 0.0:
             # What moves tells the size first.
@@ -229,8 +231,7 @@ class SceneModel:
         rows = [self.candidates(frame) for frame in frames]
         every = Candidates(
             join_outlines([row.outlines for row in rows]),
-            np.concatenate([row.colours for row in rows]),
-            np.concatenate([row.moving for row in rows]),
+            *(np.concatenate([row[k] for row in rows]) for k in (1, 2, 3)),
         )
         good = every.outlines.support >= _GOOD_SUPPORT
         moving = good & (every.moving >= _MOVING_SHARE)
@@ -246,7 +247,7 @@ class SceneModel:
         signs = (1, -1) if self._look.sign == 0 else (self._look.sign,)
         views = [self._view(frames, moves=False, sign=sign) for sign in signs]
         views.sort(key=lambda view: -view.evidence)
-        if not self.knows_background:
+        if not self.colours.knows_background:
             return views[:1]
         return [
             view
@@ -259,10 +260,10 @@ class SceneModel:
         low, high = (self.scale * radius for radius in self._look.radii)
         noise = self.colours.noise
         view = View(moves, Voting(low, high, sign, 1.0, noise), 0.0)
-        step = _usual_step(view.of(frames[-1], self.colours), noise)
+        step = usual_step(view.of(frames[-1], self.colours), noise)
         voting = view.voting._replace(step=step)
         if not low > 0.0:
-            voting = _searched_radii(view.of(frames[len(frames) // 2], self.colours), voting)
+            voting = search_radii(view.of(frames[len(frames) // 2], self.colours), voting)
         rows = [self._outlines(frame, view._replace(voting=voting)) for frame in frames]
         outlines = join_outlines(rows)
         if len(outlines.steps) == 0:
@@ -294,93 +295,3 @@ def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneMod
         return model
     # The size was found: small beads are seen better enlarged.
     return SceneModel(frames, replace(look, radii=model.radii))
-
-
-def join_outlines(parts: Sequence[Outlines]) -> Outlines:
-    """The circles of all parts."""
-    return Outlines(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-
-
-def _reduced(outlines: Outlines, scale: int) -> Outlines:
-    """Circles of an enlarged picture in the picture itself."""
-    discs = outlines.discs / scale
-    discs[:, :2] -= 0.5 * (scale - 1.0) / scale
-    return outlines._replace(
-        discs=discs, errors=outlines.errors / scale, radius_errors=outlines.radius_errors / scale
-    )
-
-
-def apart(outlines: Outlines) -> NDArray[np.bool_]:
-    """Which discs to keep, so that no two lie on one another; better ones first."""
-    discs = outlines.discs
-    order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
-    keep = np.zeros(len(discs), dtype=bool)
-    if len(discs) == 0:
-        return keep
-    pairs = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], 1.0 * discs[:, 2])
-    taken = np.zeros(len(discs), dtype=bool)
-    for k in order:
-        if not taken[k]:
-            keep[k] = True
-            taken[pairs[k]] = True
-    return keep
-
-
-def ring_colours(
-    color: NDArray[np.uint8], discs: NDArray[np.float64], parts: Sequence[float]
-) -> NDArray[np.float64]:
-    """Median colour of the circles around each centre of these parts of the radius, (n, 3)."""
-    turns = np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False)
-    across = np.outer(parts, np.cos(turns)).ravel()
-    down = np.outer(parts, np.sin(turns)).ravel()
-    columns = np.clip(np.rint(discs[:, :1] + discs[:, 2:] * across), 0, color.shape[1] - 1)
-    rows = np.clip(np.rint(discs[:, 1:2] + discs[:, 2:] * down), 0, color.shape[0] - 1)
-    values = color[rows.astype(np.intp), columns.astype(np.intp)]
-    return np.asarray(np.median(values, axis=1), dtype=np.float64).reshape(len(discs), 3)
-
-
-def _shares(mask: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of the bounding square of each disc in which the mask is 1."""
-    sums = cv2.integral(mask).astype(np.float64)
-    low = np.floor(discs[:, :2] - discs[:, 2:]).astype(np.intp)
-    high = np.ceil(discs[:, :2] + discs[:, 2:]).astype(np.intp) + 1
-    limits = np.array([mask.shape[1], mask.shape[0]])
-    low, high = np.clip(low, 0, limits), np.clip(high, 0, limits)
-    inside = (
-        sums[high[:, 1], high[:, 0]]
-        - sums[low[:, 1], high[:, 0]]
-        - sums[high[:, 1], low[:, 0]]
-        + sums[low[:, 1], low[:, 0]]
-    )
-    return np.asarray(inside / np.maximum((high - low).prod(axis=1), 1))
-
-
-def _usual_step(picture: NDArray[np.uint8], noise: float) -> float:
-    """Step of a strong edge of the picture, where beads are not yet known."""
-    across = cv2.Sobel(picture, cv2.CV_32F, 1, 0, scale=0.125)
-    down = cv2.Sobel(picture, cv2.CV_32F, 0, 1, scale=0.125)
-    size = cv2.magnitude(across, down)
-    edges = size[size > max(2.0 * noise, 1.0)]
-    # An edge spreads over about three pixels.
-    return max(3.0 * float(np.quantile(edges, 0.8)) if edges.size else 0.0, 4.0 * noise, 4.0)
-
-
-def _searched_radii(picture: NDArray[np.uint8], start: Voting) -> Voting:
-    """With smallest and largest radius of the discs that cover most of the outlines."""
-    largest = _LARGEST_SHARE * min(picture.shape)
-    count = max(1, math.ceil(math.log(largest / _SMALLEST_PX) / math.log(_RADIUS_RATIO)))
-    best, chosen = 0.0, start._replace(smallest=_SMALLEST_PX, largest=largest)
-    for k in range(count):
-        middle = _SMALLEST_PX * _RADIUS_RATIO ** (k + 0.5)
-        ratio = math.sqrt(_RADIUS_RATIO)
-        voting = start._replace(smallest=middle / ratio, largest=middle * ratio)
-        centres = find_centres(picture, voting, 2.0 * _LEAST_VOTES)
-        outlines = fit_outlines(picture, centres[:, :3], voting)
-        outlines = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
-        outlines = outlines.chosen(apart(outlines))
-        evidence = float((outlines.support**2 * outlines.discs[:, 2] * outlines.steps).sum())
-        if evidence > best:
-            radius = float(np.median(outlines.discs[:, 2]))
-            low, high = radius * (1.0 - _RADIUS_TOLERANCE), radius * (1.0 + _RADIUS_TOLERANCE)
-            best, chosen = evidence, start._replace(smallest=low, largest=high)
-    return chosen

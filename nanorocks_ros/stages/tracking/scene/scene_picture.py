@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 # A pixel differs from the background, or from what is around it, by so many times the noise.
 _DIFFERS = 5.0
 _LEAST_LEVELS = 6.0
+BACKGROUND_SHARE = 0.3
+"""A background is known where not more than this share of the pixels differs from it."""
+
 # Smallest share of the pixels that has to move to tell the colours of beads.
 _LEAST_MOVING = 2e-4
 # Noise of a pixel is not below that of rounding.
@@ -36,11 +39,14 @@ class SceneColours:
         Of blue, green and red, in the value that shows the beads.
     noise : float, [gray levels]
         Of this value, in a pixel.
+    knows_background : bool
+        Whether few enough pixels move to know what is behind the beads.
     """
 
     background: NDArray[np.uint8]
     weights: NDArray[np.float64]
     noise: float
+    knows_background: bool = False
 
     def enlarged(self, scale: int) -> SceneColours:
         """The same for pictures that are enlarged; the noise is that of their pixels."""
@@ -115,7 +121,14 @@ def scene_colours(
     weights = weights / np.abs(weights).sum()
     weights = weights if weights.sum() >= 0.0 or colour is not None else -weights
     mixed = frames[-1].astype(np.float32) @ weights.astype(np.float32)
-    return SceneColours(background=background, weights=weights, noise=_noise(mixed))
+    colours = SceneColours(background=background, weights=weights, noise=_noise(mixed))
+    share = float(np.mean([colours.moving(frame).mean() for frame in frames]))
+    if len(frames) < 3 or share > BACKGROUND_SHARE:
+        return colours
+    # Codecs smooth what the mask sees of the noise, but not how it changes.
+    still = background.astype(np.float32) @ weights.astype(np.float32)
+    changes = float(np.median(np.abs(mixed - still))) / 0.6745
+    return replace(colours, noise=max(colours.noise, changes), knows_background=True)
 
 
 def _median(frames: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:

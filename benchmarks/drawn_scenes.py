@@ -149,3 +149,47 @@ def _paint_bead(frame, place, radius, colour, scene):
     shine = np.exp(-((x + 0.35 * radius) ** 2 + (y + 0.35 * radius) ** 2) / (0.18 * radius) ** 2)
     painted = patch + (value - patch) * opacity[..., None] + scene.highlight * shine[..., None]
     patch += (painted - patch) * cover[..., None]
+
+
+SCENES = {
+    'dark on gray': DrawnScene(),
+    'bright on dark': DrawnScene(floor=(30, 28, 25), colours=((200, 205, 210),)),
+    'white on light gray': DrawnScene(
+        floor=(165, 165, 165), colours=((240, 240, 240),), highlight=10, shadow=0.3
+    ),
+    'black on black': DrawnScene(
+        floor=(40, 40, 40), colours=((15, 15, 15),), highlight=120, noise=1.5
+    ),
+    'same lightness, other colour': DrawnScene(
+        floor=(90, 160, 60), colours=((60, 105, 190),), highlight=60
+    ),
+    'four colours': DrawnScene(
+        floor=(120, 120, 120),
+        colours=((40, 40, 200), (200, 80, 40), (50, 170, 60), (30, 190, 210)),
+        shadow=0.2,
+    ),
+    'clear': DrawnScene(floor=(140, 145, 140), colours=((70, 75, 75),), rim=0.6, highlight=90),
+    'dark shadows': DrawnScene(floor=(170, 170, 165), colours=((70, 70, 120),), shadow=0.5),
+    'stained floor, rail, holes': DrawnScene(
+        floor=(100, 140, 170), colours=((60, 60, 60),), texture=12, clutter=True
+    ),
+    'radii 6 to 14 px': DrawnScene(
+        radii=(6, 14), floor=(40, 120, 30), colours=((210, 210, 215),), shadow=0.4
+    ),
+    'radius 3 px': DrawnScene(radii=(3, 3), count=60, speed=1),
+    'radius 28 px, four': DrawnScene(
+        radii=(28, 28),
+        count=4,
+        floor=(60, 110, 60),
+        colours=((200, 200, 210), (30, 30, 170)),
+        shadow=0.4,
+    ),
+    'crowded': DrawnScene(count=140, speed=1.0, floor=(170, 180, 180), colours=((70, 100, 140),)),
+    'half of them at rest': DrawnScene(
+        at_rest=0.5, clutter=True, floor=(60, 120, 50), colours=((210, 210, 215),)
+    ),
+    'a single one': DrawnScene(
+        count=1, speed=4, floor=(60, 120, 50), colours=((40, 40, 190),), clutter=True, shadow=0.3
+    ),
+}
+"""Scenes by what is difficult in them."""
