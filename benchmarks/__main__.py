@@ -29,6 +29,7 @@ ALL = (
     'recorder',
     'foreign_world',
     'ranks',
+    'contacts_alone',
     'radii',
     'speed_trays',
     'speed_grains',

@@ -1,4 +1,4 @@
-"""Size and frame rate of a recording, and some of its frames.
+"""Size of the pictures of a recording, and some of them.
 
 Tested by ``test/studies/measure/test_film_samples.py``.
 """
@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.tray_regions import blue_first
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 
@@ -20,8 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Frames that are read for size and rate, and kept of the whole film.
-_FIRST, _KEPT = 8, 25
+# Frames that are kept of a whole film.
+_KEPT = 25
 
 
 class FilmSamples(NamedTuple):
@@ -31,14 +30,11 @@ class FilmSamples(NamedTuple):
     ----------
     size : tuple of 2 ints, [px]
         Width and height.
-    rate : float, [1/s]
-        Frames per second: the inverse of the median interval.
     frames : tuple of ndarray of uint8, (rows, columns, 3), bgr
-        Spread over the film.
+        The first one, or some spread over the film.
     """
 
     size: tuple[int, int]
-    rate: float
     frames: tuple[NDArray[np.uint8], ...]
 
 
@@ -52,32 +48,26 @@ def film_samples(path: Path, image_topic: str = '', *, whole: bool = False) -> F
     image_topic : str, optional
         The camera's topic if it has another name than the graph's.
     whole : bool
-        Whether frames of the whole film are read; else the first ones, which is faster.
+        Whether frames of the whole film are read; else the first one, which is faster.
 
     Raises
     ------
     RecordingError
-        When it cannot be read, or holds fewer than two frames that can be used.
+        When it cannot be read, or holds no frame that can be used.
     """
     bag = BagFrames(path, image_topic)
-    every = max(1, bag.count // _KEPT) if whole else 1
+    every = max(1, bag.count // _KEPT)
     frames: list[NDArray[np.uint8]] = []
-    stamps: list[int] = []
     for number, frame in enumerate(bag.frames()):
-        if isinstance(frame, FrameError):
+        if isinstance(frame, FrameError) or (frames and number % every):
             continue
-        if len(stamps) < _FIRST:
-            stamps.append(frame.stamp_ns)
-        elif not whole:
+        frames.append(_in_colour(blue_first(frame)))
+        if not whole:
             break
-        if number % every == 0:
-            frames.append(_in_colour(blue_first(frame)))
-    steps = np.diff(np.array(stamps))
-    steps = steps[steps > 0]
-    if not steps.size:
-        raise RecordingError(bag.where, 'holds fewer than two frames', 'record a longer film')
+    if not frames:
+        raise RecordingError(bag.where, 'holds no frame that can be used', 'record it again')
     height, width = frames[0].shape[:2]
-    return FilmSamples((width, height), NS / float(np.median(steps)), tuple(frames))
+    return FilmSamples((width, height), tuple(frames))
 
 
 def _in_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
