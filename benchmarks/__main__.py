@@ -30,6 +30,7 @@ ALL = (
     'foreign_world',
     'ranks',
     'contacts_alone',
+    'own_tray',
     'radii',
     'speed_trays',
     'speed_grains',

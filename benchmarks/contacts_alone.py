@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from benchmarks.accelerated_tray import AcceleratedTray
+from benchmarks.contacts import tracks_of
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contacts_alone import contacts_alone
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, SimulationSettings
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
-
-sys.path.append(str(Path(__file__).resolve().parent.parent / 'test/support'))
-from bead_paths import PIXEL, tracks_of
 
 PAIRS, WALLS = 0.85, 0.93
 RUNS, FRAMES = 8, 300
@@ -22,14 +17,12 @@ TRAY = load_trays()[1]
 
 
 def tracks(seed, acceleration):
-    """Tracks of a gas of tray 1, with the stated errors of the places."""
+    """Tracks of a gas of tray 1, with errors of the places."""
     settings = SimulationSettings(
         restitution=PAIRS, wall_restitution=WALLS, seed=seed, mean_speed=0.010, first_shake=0.0
     )
-    moments = list(AcceleratedTray(settings, TRAY, 0, acceleration).moments(FRAMES))
-    positions = np.array([moment.positions[:, :2] for moment in moments])
-    velocities = np.array([moment.velocities[:, :2] for moment in moments])
-    return list(tracks_of(positions, velocities=velocities, jitter=0.02 * PIXEL))
+    gas = AcceleratedTray(settings, TRAY, 0, acceleration)
+    return list(tracks_of(gas, TRAY, np.random.default_rng(seed), FRAMES))
 
 
 def report():
