@@ -3,7 +3,7 @@
 ``python -m benchmarks recognition`` draws scenes, by a painter that shares no code with the
 package, and prints recall and precision with the diameter told and with nothing told.
 ``python -m benchmarks.recognition CLIP DIAMETER_PX [PICTURE]`` counts discs in a video;
-`benchmarks/clips.md` says where some that may be used come from.
+`benchmarks.clips` knows some that may be used.
 """
 
 from __future__ import annotations

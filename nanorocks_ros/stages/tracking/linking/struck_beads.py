@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.stages.tracking.linking.link_probabilities import DetectedBeads, KnownBeads
 
-# A bead is expected again within so many frames after it was last seen.
-_FRAMES = 3.5
+# A bead was seen so many frames ago: in the frame before.
+_FRAMES = 1.5
 # Another bead or detection has to be so many times as far away.
 _ALONE = 1.5
 # Radii of the same bead differ by less than this part.

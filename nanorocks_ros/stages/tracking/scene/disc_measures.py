@@ -34,14 +34,21 @@ def reduced(outlines: Outlines, scale: int) -> Outlines:
     )
 
 
-def apart(outlines: Outlines) -> NDArray[np.bool_]:
-    """Which discs to keep, so that no two lie on one another; better ones first."""
+def apart(outlines: Outlines, radii: float = 1.0) -> NDArray[np.bool_]:
+    """Which discs to keep, so that no two lie on one another; better ones first.
+
+    Parameters
+    ----------
+    outlines : Outlines
+    radii : float, optional
+        Smallest distance of two centres, in radii.
+    """
     discs = outlines.discs
     order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
     keep = np.zeros(len(discs), dtype=bool)
     if len(discs) == 0:
         return keep
-    pairs = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], 1.0 * discs[:, 2])
+    pairs = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], radii * discs[:, 2])
     taken = np.zeros(len(discs), dtype=bool)
     for k in order:
         if not taken[k]:

@@ -31,6 +31,8 @@ _FOLLOWING_FRAMES = 5
 _DARKEST, _BRIGHTEST = 0.4, 1.35
 # Systematic error of a position: light and shadow on the outline, [px].
 _LEAST_ERROR_PX = 0.03
+# In a layer, up to this height over the diameter, beads are so many radii apart in the picture.
+_LAYER, _LAYER_APART = 1.25, 1.25
 # Vertices of masks have this resolution, [px].
 _SUBPIXEL_BITS = 4
 
@@ -64,7 +66,7 @@ class SceneDetector:
     def __init__(self, tray: Tray, pixels_per_metre: float) -> None:
         self._tray = tray
         self._scale = pixels_per_metre
-        self._looks = [_look(species, pixels_per_metre) for species in tray.species]
+        self._looks = [_look(tray, species, pixels_per_metre) for species in tray.species]
         self._models: list[SceneModel] = []
         self._kept: list[NDArray[np.uint8]] = []
         self._every = 1
@@ -196,13 +198,14 @@ class SceneDetector:
         return self._tray.species[k].count
 
 
-def _look(species: Species, pixels_per_metre: float) -> BeadLook:
+def _look(tray: Tray, species: Species, pixels_per_metre: float) -> BeadLook:
     appearance = species.appearance
     low = 0.5 * species.diameter_low * pixels_per_metre / _RADIUS_TOLERANCE
     high = 0.5 * species.diameter_high * pixels_per_metre * _RADIUS_TOLERANCE
     return BeadLook(
         radii=(low, high) if math.isfinite(low) else (math.nan, math.nan),
         sign=0 if appearance is None else appearance.sign,
+        apart=_LAYER_APART if not tray.dimensions[2] > _LAYER * species.diameter_high else 1.0,
         colour=species.properties.color if appearance is None else appearance.colour,
     )
 

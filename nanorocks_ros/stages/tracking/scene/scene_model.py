@@ -68,11 +68,14 @@ class BeadLook:
     sign : int
         1: brighter than the floor, -1: darker, 0: not known.
     colour : tuple of 3 floats or None, bgr, [gray levels]
+    apart : float
+        Smallest distance of two beads in the picture, in radii.
     """
 
     radii: tuple[float, float] = (math.nan, math.nan)
     sign: int = 0
     colour: tuple[float, float, float] | None = None
+    apart: float = 1.25
 
 
 class Candidates(NamedTuple):
@@ -165,7 +168,7 @@ class SceneModel:
         outlines = join_outlines(
             [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
         )
-        outlines = outlines.chosen(apart(outlines))
+        outlines = outlines.chosen(apart(outlines, self._look.apart))
         if self.colours.knows_background:
             outlines = outlines.chosen(~self._left(color, outlines.discs))
         colours = ring_colours(color, outlines.discs, _INSIDE)
