@@ -17,7 +17,12 @@ from nanorocks_ros.inference.contacts.dragged_contacts import (
     loss_beside_contacts,
     loss_sums,
 )
-from nanorocks_ros.inference.flights.flight_losses import Slowing, flight_losses, flight_table
+from nanorocks_ros.inference.flights.flight_losses import (
+    MIN_FLIGHTS,
+    Slowing,
+    flight_losses,
+    flight_table,
+)
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import (
     UNKNOWN_MEASURED_INTERVAL,
@@ -72,7 +77,7 @@ class ContactsAlone:
     by_wall : dict of int to RestitutionOfContacts
         Of each side wall with rebounds: 0 to 3, low and high along columns, along rows.
     drag : Measured, [1/s]
-        Of the gas, which the speeds are corrected for.
+        Of the gas, which the speeds are corrected for; the prior where few flights were seen.
     """
 
     beads: RestitutionOfContacts
@@ -100,8 +105,9 @@ def contacts_alone(
         Of the intervals.
     """
     losses = flight_losses(flight_table(flights), Measured(prior.drag, prior.drag_error))
-    is_known = losses.flights > 0 and losses.drag.value > 3.0 * losses.drag.error
-    drag = losses.drag.value if is_known else max(prior.drag, 0.0)
+    # With fewer flights the prior alone would speak, which is that of a gas at low pressure.
+    is_measured = losses.flights >= MIN_FLIGHTS
+    drag = max(losses.drag.value if is_measured else prior.drag, 0.0)
     own = [_complete(dragged(contact, drag)) for contact in contacts]
     rebounds = [contact for contact in own if isinstance(contact, Rebound)]
     collisions = [
@@ -109,7 +115,7 @@ def contacts_alone(
         for contact in own
         if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
     ]
-    slowing = Slowing.by_drag(Measured(drag, losses.drag.error if is_known else 0.0))
+    slowing = Slowing.by_drag(losses.drag if is_measured else Measured(drag, 0.0))
     numbers = sorted({rebound.wall for rebound in rebounds})
 
     def walls(some: Sequence[Rebound]) -> RestitutionOfContacts:
