@@ -167,7 +167,7 @@ def _as_json(bag: TrackedBag, compared: dict[int, TrackComparison]) -> dict[str,
             str(number): {
                 'frames': len(bag.tracks[number]),
                 'species': _counts(bag, number),
-                'recognition': [verdict_as_json(row) for row in bag.verdicts[number]],
+                'recognition': [verdict_as_json(row) for row in bag.verdicts.get(number, ())],
                 'comparison': _comparison_as_json(compared.get(number)),
             }
             for number in bag.trays
@@ -205,7 +205,7 @@ def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
         print(f'tray {number}: {len(bag.tracks[number])} frames tracked')
         for row in _counts(bag, number):
             print(f'  {row["material"]}: {_seen(row)}, {row["tracks"]} tracks')
-        for verdict in bag.verdicts[number]:
+        for verdict in bag.verdicts.get(number, ()):
             for line in verdict.lines():
                 print(f'  {line}')
         if number in compared:

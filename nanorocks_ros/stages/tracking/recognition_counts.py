@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,8 @@ _REST_RADII, _REST_ERRORS = 0.25, 8.0
 _LONG_SHARE = 0.25
 # Discs of beads that touch are apart by the sum of their radii in space; edges err by some of it.
 _OVERLAP = 0.8
+# Frames of the longer displacements; how many tell, and their squares over those of errors.
+_LONG_LAG, _LEAST_DISPLACEMENTS, _LEAST_SIGNAL = 4, 100, 4.0
 # Speeds above this part of the limit: faster beads have lost their tracks.
 _NEAR_LIMIT = 0.8
 
@@ -58,6 +61,11 @@ class SpeciesCounts:
         That largest speed.
     wrong_scale : float
         Share of the frames that are flagged `WRONG_SCALE`.
+    spread_exponent : float
+        Power of the time with which squared displacements grow: 2 in free flight, 1 in diffusion;
+        NaN: too few displacements above the errors of the positions.
+    learnt : bool
+        Whether the look of the beads is learnt from the film.
     """
 
     tray: int
@@ -75,6 +83,8 @@ class SpeciesCounts:
     near_limit: float
     max_speed: float
     wrong_scale: float
+    spread_exponent: float = math.nan
+    learnt: bool = False
 
 
 class RecognitionCounter:
@@ -139,6 +149,8 @@ class RecognitionCounter:
             near_limit=counter.fast / max(counter.speeds, 1),
             max_speed=self._max_speed,
             wrong_scale=self._wrong_scale / frames,
+            spread_exponent=counter.spread.exponent,
+            learnt=species.appearance is not None,
         )
 
 
@@ -151,6 +163,7 @@ class _SpeciesCounter:
         self.fast = self.speeds = 0
         # By number of the track: images, least and largest place, sums of radius and error.
         self._sums = np.empty((0, 7))
+        self.spread = _Spread()
 
     def push(
         self, tracks: Tracks, own: NDArray[np.bool_], expected: int, max_speed: float
@@ -165,6 +178,7 @@ class _SpeciesCounter:
         self.speeds += int(np.isfinite(speeds).sum())
         self.fast += int((speeds > _NEAR_LIMIT * max_speed).sum())
         self._extend(tracks, seen)
+        self.spread.push(tracks.ids[seen], tracks.positions[seen], tracks.position_errors[seen])
 
     def _overlapping(self, places: NDArray[np.float64], radii: NDArray[np.float64]) -> int:
         """Discs that overlap another one more than two beads can."""
@@ -215,6 +229,41 @@ class _SpeciesCounter:
         extent = np.hypot(*(rows[:, 3:5] - rows[:, 1:3]).T)
         rest = np.maximum(_REST_RADII * rows[:, 5], _REST_ERRORS * rows[:, 6]) / images
         return float(images[extent < rest].sum() / images.sum())
+
+
+class _Spread:
+    """How squared displacements grow from one frame to several."""
+
+    def __init__(self) -> None:
+        self._frames: deque[tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]] = (
+            deque(maxlen=_LONG_LAG + 1)
+        )
+        # By lag: displacements, sum of their squares, and what errors add to it.
+        self._sums = {lag: np.zeros(3) for lag in (1, _LONG_LAG)}
+
+    def push(
+        self,
+        beads: NDArray[np.int32],
+        places: NDArray[np.float64],
+        errors: NDArray[np.float64],
+    ) -> None:
+        self._frames.append((beads, places, errors))
+        for lag, sums in self._sums.items():
+            if len(self._frames) > lag:
+                before = self._frames[-1 - lag]
+                _, own, their = np.intersect1d(beads, before[0], True, return_indices=True)
+                squares = ((places[own] - before[1][their]) ** 2).sum()
+                noise = 2.0 * (errors[own] ** 2 + before[2][their] ** 2).sum()
+                sums += own.size, squares, noise
+
+    @property
+    def exponent(self) -> float:
+        """Power of the time; NaN where it is not known."""
+        (short, squares, noise), (long, far, far_noise) = self._sums.values()
+        if min(short, long) < _LEAST_DISPLACEMENTS or squares < _LEAST_SIGNAL * noise:
+            return math.nan
+        ratio = (far - far_noise) / long / ((squares - noise) / short)
+        return math.log(ratio) / math.log(_LONG_LAG) if ratio > 0.0 else math.nan
 
 
 def _least_distance(tray: Tray, index: int) -> float:

@@ -47,7 +47,8 @@ _NEIGHBOUR_SHARE = 0.5
 class Tracker(RestartingStage[TrayImage, Tracks]):
     """Tracks the beads of one tray.
 
-    An image gives one record of tracks; a gray image none, since colour separates the species.
+    An image gives one record of tracks; a gray image none, since colour separates the species,
+    unless the look of the beads is learnt from the film.
 
     Parameters
     ----------
@@ -131,7 +132,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
 
     def _process(self, record: TrayImage) -> tuple[Tracks, ...]:
         """Detect and link the beads of an image."""
-        if record.color is None:
+        color = self.color_of(record)
+        if color is None:
             self.watch(record)
             return ()
         time = self._time(record)
@@ -144,7 +146,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         rest = self._camera.camera_moves or math.isnan(record.displacement[0])
         expected = np.zeros(2) if rest else self._scale * np.array(record.displacement)
         hints = [linker.hints(time, expected) for linker in self._linkers]
-        detected = self._detector.detect(record.color, hints)
+        detected = self._detector.detect(color, hints)
         motion = self._motion(
             record,
             np.concatenate([detections.positions for detections in detected]),
@@ -163,6 +165,12 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             )
             self._next_id += linker.push(time, shifted, shift, self._next_id)
         return (self._tracks(record, time, motion),)
+
+    def color_of(self, image: TrayImage) -> NDArray[np.uint8] | None:
+        """The colours of an image; those of a gray one where beads are learnt, None otherwise."""
+        if image.color is None and self._tray.is_learnt:
+            return np.repeat(image.gray[:, :, None], 3, axis=2)
+        return image.color
 
     def watch(self, image: TrayImage) -> None:
         """Follow the motion of the picture alone, where beads are not tracked."""

@@ -10,7 +10,10 @@ from nanorocks_ros.experiment.film_section import FilmSection, film_section
 from nanorocks_ros.stages.tracking.recognition_counts import RecognitionCounter
 from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
-from nanorocks_ros.studies.analysis.recognition_verdicts import recognition_verdicts
+from nanorocks_ros.studies.analysis.recognition_verdicts import (
+    recognition_verdicts,
+    scenery_of,
+)
 from nanorocks_ros.studies.analysis.scene_frames import scene_frames
 
 if TYPE_CHECKING:
@@ -133,7 +136,9 @@ def track_bag(
     if not any(bag.tracks.values()):
         raise _without_colour(images.bag.where)
     bag.verdicts = {
-        number: recognition_verdicts(counter.counts()) for number, counter in counters.items()
+        number: recognition_verdicts(counter.counts(), scenery_of(bag.pictures[number].gray))
+        for number, counter in counters.items()
+        if number in bag.pictures
     }
     return bag
 

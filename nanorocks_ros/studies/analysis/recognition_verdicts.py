@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import FLAGS, FlagWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from numpy.typing import NDArray
 
     from nanorocks_ros.stages.tracking.recognition_counts import SpeciesCounts
 
@@ -30,8 +34,13 @@ _MAX_AT_REST, _MAX_OVERLAPPING, _MAX_ELONGATED = 0.5, 0.3, 0.4
 # Share of the speeds near the limit: flagged, and not usable.
 _NEAR_LIMIT, _AT_LIMIT = 0.01, 0.05
 _MAX_WRONG_SCALE = 0.5
+# Power of the time below which displacements are those of diffusion, not of flight.
+_FREE_FLIGHT = 1.35
 # Shorter tracks, where any number may be, are not those of beads; from this many frames on.
 _SHORT_TRACK, _ENOUGH_FRAMES = 5.0, 20
+
+# Pixels that stand out from the floor: times its scatter, gray levels, and share of the picture.
+_OUTSTANDING, _LEAST_LEVELS, _LEAST_OUTSTANDING = 4.0, 8.0, 1e-3
 
 _SEE = 'look at the rings with `nanorocks track BAG --picture tracks.png`'
 
@@ -120,6 +129,22 @@ def recognition_verdicts(
     return tuple(recognition_verdict(row, scenery) for row in counts if row.followed)
 
 
+def scenery_of(gray: NDArray[np.uint8]) -> Scenery:
+    """What a picture of the tray says of its beads.
+
+    Parameters
+    ----------
+    gray : ndarray of uint8, (rows, columns)
+    """
+    values = gray.astype(np.float64)
+    off = values - np.median(values)
+    scatter = 1.4826 * float(np.median(np.abs(off)))
+    outstanding = np.abs(off) > max(_OUTSTANDING * scatter, _LEAST_LEVELS)
+    if outstanding.mean() < _LEAST_OUTSTANDING:
+        return Scenery()
+    return Scenery(contrast='bright' if off[outstanding].sum() > 0.0 else 'dark')
+
+
 def verdict_as_json(verdict: Verdict) -> dict[str, Any]:
     """A verdict as plain values."""
     values: dict[str, Any] = json_values(asdict(verdict))
@@ -152,7 +177,7 @@ def _number_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
         nothing = share < _NOTHING
         few, too_few = _NOTHING <= share < _FEW, share < _TOO_FEW
         many = share > _TOO_MANY
-    look, remedy = _contrast_words(scenery)
+    look, remedy = _contrast_words(counts, scenery)
     return [
         _Fault(nothing, True, FlagWords('nothing_seen', f'no bead was recognised{look}', remedy)),
         _Fault(
@@ -161,7 +186,7 @@ def _number_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
             FlagWords(
                 'few_seen',
                 f'fewer beads than the trays file tells{look}',
-                f'{_SEE}; correct count and diameter_mm, or the look of the beads ({remedy})',
+                f'{_SEE}; correct the count, or {remedy}',
             ),
         ),
         _Fault(
@@ -178,8 +203,10 @@ def _number_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
     ]
 
 
-def _contrast_words(scenery: Scenery) -> tuple[str, str]:
+def _contrast_words(counts: SpeciesCounts, scenery: Scenery) -> tuple[str, str]:
     """Why nothing may be seen, and the remedy."""
+    if counts.learnt:
+        return '', 'correct diameter_mm, the scale, and colour and look of the species, if told'
     if scenery.contrast == 'bright':
         return ', and the beads look brighter than the floor', 'add `look: bright` to the species'
     if scenery.contrast == 'dark':
@@ -212,7 +239,7 @@ def _shape_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
                 'never_move',
                 f'{_PERCENT * counts.at_rest:.0f} % of the discs never move: parts of the '
                 'container, or beads at rest',
-                f'{_SEE}; correct diameter_mm or colour, or leave such places out with `mask_px:`',
+                f'{_SEE}; correct diameter_mm or colour, or leave them out with `masks_mm:`',
             ),
         ),
         _Fault(
@@ -240,6 +267,17 @@ def _scale(counts: SpeciesCounts) -> list[_Fault]:
                 f'{_PERCENT * counts.near_limit:.0f} % of the speeds are near {limit:g} mm/s, '
                 'the largest that is linked; faster beads are lost',
                 f'raise it: --tracking-max-speed {3.0 * counts.max_speed:g}',
+            ),
+        ),
+        _Fault(
+            counts.spread_exponent < _FREE_FLIGHT,
+            False,
+            FlagWords(
+                'diffusive',
+                'beads do not fly straight from frame to frame (squared displacements grow as '
+                f'time to the power {counts.spread_exponent:.1f}, 2 in free flight): a mean speed '
+                'depends on the lag',
+                'film at a higher rate, or compare diffusion instead of speeds',
             ),
         ),
         _Fault(

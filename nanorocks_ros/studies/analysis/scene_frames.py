@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 
 if TYPE_CHECKING:
@@ -54,10 +55,12 @@ def scene_frames(
     if not learnt:
         return {}
     images = BagImages(path, settings, image_topic)
+    trackers = {number: Tracker(images.settings, images.trays[number]) for number in learnt}
     frames: dict[int, list[NDArray[np.uint8]]] = {number: [] for number in learnt}
     every = max(1, images.bag.count // _FRAMES)
     for shot in images.shots(progress, every=every):
         for image in shot.images:
-            if image.tray in learnt and image.color is not None:
-                frames[image.tray].append(image.color)
+            color = trackers[image.tray].color_of(image) if image.tray in learnt else None
+            if color is not None:
+                frames[image.tray].append(color)
     return {number: rows for number, rows in frames.items() if rows}

@@ -111,3 +111,22 @@ def test_a_tray_without_any_disc_has_none():
     counts = counts_of(tracks_at(k, np.empty((0, 2))) for k in range(3))
     assert (counts.seen, counts.tracks) == (0.0, 0)
     assert math.isnan(counts.track_length)
+
+
+@pytest.mark.parametrize(('power', 'low', 'high'), [(1.0, 1.9, 2.1), (0.5, 0.7, 1.3)])
+def test_displacements_tell_flight_from_diffusion(power, low, high):
+    rng = np.random.default_rng(2)
+    steps = 2e-4 * rng.normal(0.0, 1.0, (FRAMES, 15, 2))
+    if power == 1.0:
+        steps[:] = steps[0]
+    paths = lattice(15) + np.cumsum(steps, axis=0)
+    counts = counts_of(tracks_at(k, places) for k, places in enumerate(paths))
+    assert low < counts.spread_exponent < high
+
+
+def test_beads_at_rest_do_not_tell_flight_from_diffusion():
+    rng = np.random.default_rng(3)
+    counts = counts_of(
+        tracks_at(k, lattice(15) + rng.normal(0.0, 5e-6, (15, 2))) for k in range(FRAMES)
+    )
+    assert math.isnan(counts.spread_exponent)

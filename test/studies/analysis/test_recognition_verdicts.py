@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from nanorocks_ros.stages.tracking.recognition_counts import SpeciesCounts
@@ -13,6 +14,7 @@ from nanorocks_ros.studies.analysis.recognition_verdicts import (
     Scenery,
     recognition_verdict,
     recognition_verdicts,
+    scenery_of,
     verdict_as_json,
 )
 
@@ -57,6 +59,7 @@ def test_beads_that_are_nearly_always_seen_are_usable():
         ({'near_limit': 0.2}, 'speed_limit', False),
         ({'wrong_scale': 0.9}, 'wrong_scale', False),
         ({'track_length': 2.0}, 'short_tracks', False),
+        ({'spread_exponent': 1.0}, 'diffusive', True),
     ],
 )
 def test_each_fault_has_a_flag_and_a_remedy(changes, flag, usable):
@@ -104,3 +107,16 @@ def test_a_verdict_is_plain_json():
     values = verdict_as_json(recognition_verdict(replace(GOOD, track_length=math.nan, seen=0.0)))
     assert json.loads(json.dumps(values, allow_nan=False)) == values
     assert values['flags'][0]['name'] == 'nothing_seen'
+
+
+def test_nothing_seen_of_beads_that_are_learnt_has_another_remedy():
+    flag = recognition_verdict(replace(GOOD, seen=0.0, learnt=True)).flags[0]
+    assert 'correct diameter_mm' in flag.remedy
+    assert 'look: auto' not in flag.remedy
+
+
+@pytest.mark.parametrize(('level', 'contrast'), [(220, 'bright'), (20, 'dark'), (110, '')])
+def test_a_picture_says_whether_beads_are_bright_or_dark(level, contrast):
+    picture = np.random.default_rng(1).integers(105, 115, (100, 100)).astype(np.uint8)
+    picture[20:30, 20:30] = level
+    assert scenery_of(picture).contrast == contrast
