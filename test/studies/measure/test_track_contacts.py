@@ -12,6 +12,10 @@ from bead_paths import PIXEL, RATE, tracks_of
 from benchmarks.accelerated_tray import AcceleratedTray
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
+from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
+from nanorocks_ros.simulation.shaken_tray import after_shaking
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
 
 TRAY = load_trays()[1]
@@ -87,6 +91,37 @@ def test_a_gas_that_falls_gives_both_restitutions_whether_the_walls_are_told(fal
     assert beads.restitution.lower < 0.85 < beads.restitution.upper
     assert walls.restitution.lower < 0.93 < walls.restitution.upper
     assert walls.restitution.upper - walls.restitution.lower < 0.02
+
+
+def test_a_driven_tray_in_a_steady_state_gives_both_restitutions():
+    settings = SimulationSettings(
+        restitution=0.85, wall_restitution=0.93, seed=3, mean_speed=0.008, first_shake=0.0
+    )
+    motion = WallMotion(amplitude=(6e-4, 4e-4, 0.0), angular_frequency=2.0 * math.pi * 1.3)
+    rules = rules_of(settings, TRAY, 0)
+    beads = after_shaking(settings, rules, resting_beads(settings, TRAY), 0, 0)
+    times = np.arange(900) / RATE
+    run = HardSphereGas(beads, replace(rules, motion=motion)).follow(times[-1], times)
+    shift = np.outer(np.sin(motion.angular_frequency * times), motion.amplitude[:2])
+    result = track_contacts(
+        list(
+            tracks_of(
+                run.positions[:, :, :2],
+                velocities=run.velocities[:, :, :2],
+                displacements=shift,
+                jitter=0.02 * PIXEL,
+            )
+        ),
+        TRAY,
+        SETTINGS,
+    )
+    beads_alone, walls = result.alone.beads, result.alone.walls
+    # Driven: at the end the beads are as fast as the walls, and there are contacts throughout.
+    assert max(contact.stamp_ns for contact in result.contacts) > 0.9e9 * times[-1]
+    assert beads_alone.contacts > 30
+    assert walls.contacts > 30
+    assert beads_alone.restitution.lower < 0.85 < beads_alone.restitution.upper
+    assert walls.restitution.lower < 0.93 < walls.restitution.upper
 
 
 def test_films_without_contacts_give_no_restitution():
