@@ -20,7 +20,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from benchmarks.recognition import discs_in, read_clip
+from benchmarks.recognition import discs_in, read_clip, with_discs
 
 _RAW = 'https://raw.githubusercontent.com'
 _PEER = """
@@ -128,15 +128,6 @@ def peer_counts(clip, frames, folder, peer):
     return json.loads(answer.stdout)
 
 
-def draw_discs(path, frame, discs):
-    """Write a frame with its discs."""
-    image = frame.copy()
-    for x, y, radius in discs:
-        place = round(16 * x), round(16 * y)
-        cv2.circle(image, place, round(16 * radius), (0, 255, 0), 1, cv2.LINE_AA, 4)
-    cv2.imwrite(str(path), image)
-
-
 def report(folder, mirror, peer):
     """Print a row for each clip."""
     cv2.setNumThreads(1)
@@ -157,7 +148,8 @@ def report(folder, mirror, peer):
             )
         print(f'| {row} |', flush=True)
         middle = len(discs) // 2
-        draw_discs(folder / f'{name}.png', frames[chosen[middle]], discs[middle])
+        image = with_discs(frames[chosen[middle]], discs[middle])
+        cv2.imwrite(str(folder / f'{name}.png'), image)
 
 
 def main():

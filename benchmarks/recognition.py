@@ -2,6 +2,7 @@
 
 ``python -m benchmarks recognition`` draws scenes, by a painter that shares no code with the
 package, and prints recall and precision with the diameter told and with nothing told.
+``python -m benchmarks.recognition OUT.jpg`` makes the picture of the documentation, and
 ``python -m benchmarks.recognition CLIP DIAMETER_PX [PICTURE]`` counts discs in a video;
 `benchmarks.clips` knows some that may be used.
 """
@@ -26,6 +27,7 @@ _RIGHT = 0.3
 _SEEDS = (1, 2, 3)
 _LEARNING_FRAMES = 25
 _EVERY = 6
+_RING = 0, 255, 255
 _UNKNOWN = math.nan, math.nan
 
 
@@ -107,7 +109,7 @@ def read_clip(path):
     return frames
 
 
-def clip_report(path, diameter, picture=''):
+def clip_report(path, diameter, drawn=''):
     """Print the discs found in a clip, and draw those of the frame in the middle."""
     cv2.setNumThreads(1)
     frames = read_clip(path)
@@ -121,14 +123,32 @@ def clip_report(path, diameter, picture=''):
         f'{max(counts)}), radius {size:.1f} px; {1e3 * learning:.0f} ms to learn, '
         f'{1e3 * each:.1f} ms per frame'
     )
-    if picture:
+    if drawn:
         middle = len(discs) // 2
-        image = frames[_EVERY * middle].copy()
-        for x, y, size in discs[middle]:
-            place = round(16 * x), round(16 * y)
-            cv2.circle(image, place, round(16 * size), (0, 255, 0), 1, cv2.LINE_AA, 4)
-        cv2.imwrite(picture, image)
+        cv2.imwrite(drawn, with_discs(frames[_EVERY * middle], discs[middle]))
+
+
+def with_discs(frame, discs, scale=1):
+    """A frame, enlarged, with a ring around each disc."""
+    image = cv2.resize(frame, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    for x, y, radius in discs:
+        place = round(16 * ((x + 0.5) * scale - 0.5)), round(16 * ((y + 0.5) * scale - 0.5))
+        cv2.circle(image, place, round(16 * radius * scale), _RING, 1, cv2.LINE_AA, 4)
+    return image
+
+
+def picture(path):
+    """Write one frame of each drawn scene with the discs found, the diameter not told."""
+    tiles = []
+    for name, scene in SCENES.items():
+        frames, _ = draw(scene)
+        discs, _, _ = discs_in(frames, _UNKNOWN)
+        tile = with_discs(frames[0], discs[0])
+        cv2.putText(tile, name, (8, 292), cv2.FONT_HERSHEY_SIMPLEX, 0.55, _RING, 1, cv2.LINE_AA)
+        tiles.append(tile)
+    rows = [np.hstack(tiles[k : k + 3]) for k in range(0, len(tiles), 3)]
+    cv2.imwrite(path, np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 75])
 
 
 if __name__ == '__main__':
-    clip_report(*sys.argv[1:])
+    (picture if len(sys.argv) == 2 else clip_report)(*sys.argv[1:])

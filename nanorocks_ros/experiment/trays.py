@@ -101,6 +101,27 @@ def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
     return trays[number]
 
 
+def require_measurable(tray: Tray) -> None:
+    """Check that restitutions can be measured in a tray, not only beads followed.
+
+    Raises
+    ------
+    ConfigurationError
+        When its height, or count or density of a species, is not known.
+    """
+    missing = ['height (third of dimensions_mm)'] * math.isnan(tray.dimensions[2])
+    for species in tray.species:
+        missing += [f'count of {species.material}'] * (not species.counted)
+        missing += [f'density of {species.material}'] * math.isnan(species.density)
+    if missing:
+        raise ConfigurationError(
+            f'tray {tray.number}',
+            f'the trays file does not tell {", ".join(missing)}',
+            'add it (a density under "densities_g_cm3:"), or follow the beads with '
+            '`nanorocks track`',
+        )
+
+
 class _TrayFile(YamlLines):
     """Trays from the nodes of a file."""
 

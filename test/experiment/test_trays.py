@@ -10,7 +10,11 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.appearance import Appearance
-from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.experiment.trays import (
+    load_trays,
+    require_measurable,
+    tray_by_number,
+)
 
 PAPER = json.loads((Path(__file__).parents[1] / 'paper_values.json').read_text())
 
@@ -118,6 +122,19 @@ def test_beads_may_be_followed_by_diameter_and_look_alone():
     assert math.isnan(tray.dimensions[2])
     assert tray.inside[1] == pytest.approx((0.29, 0.01))
     assert len(tray.masks[0]) == 3
+
+
+def test_restitutions_need_more_than_following_beads():
+    for tray in load_trays().values():
+        require_measurable(tray)
+    text = (
+        'trays:\n  1:\n    dimensions_mm: [30, 20]\n'
+        '    species:\n      - {material: lead, look: auto, diameter_mm: 2}\n'
+    )
+    with pytest.raises(ConfigurationError, match=r'height .* count of lead, density of lead; add'):
+        require_measurable(load_trays(text)[1])
+    whole = text.replace('20]', '20, 3]').replace('mm: 2}', 'mm: 2, count: 5}')
+    require_measurable(load_trays('densities_g_cm3: {lead: 11.3}\n' + whole)[1])
 
 
 def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
