@@ -26,11 +26,11 @@ STRUCK = DrawnScene(
     speed=5.0,
     frames=90,
 )
-TRAY = 'trays:\n  1:\n    dimensions_mm: [400, 300]\n    species:\n      - {%s}\n'
+TRAY = 'trays:\n  1:\n    dimensions_mm: [{}, {}]\n    species:\n      - {{{}}}\n'
 
 
-def imported(folder, frames, species):
-    """A bag of the frames, which knows its trays file."""
+def imported(folder, frames, species, *, scale=1000.0):
+    """A bag of the frames, which knows its trays file; the scale is in px/m."""
     video = folder / 'film.avi'
     size = frames[0].shape[1], frames[0].shape[0]
     writer = cv2.VideoWriter(str(video), cv2.VideoWriter_fourcc(*'MJPG'), 30, size)
@@ -38,9 +38,19 @@ def imported(folder, frames, species):
     for frame in frames:
         writer.write(frame)
     writer.release()
-    (folder / 'mine.yaml').write_text(TRAY % species, encoding='utf-8')
+    sides = (1e3 * length / scale for length in size)
+    (folder / 'mine.yaml').write_text(TRAY.format(*sides, species), encoding='utf-8')
     bag = folder / 'bag'
-    call = ['import', str(video), '-o', str(bag), '--trays', '1', '--pixels-per-metre', '1000']
+    call = [
+        'import',
+        str(video),
+        '-o',
+        str(bag),
+        '--trays',
+        '1',
+        '--pixels-per-metre',
+        f'{scale:g}',
+    ]
     assert main([*call, '--trays-file', str(folder / 'mine.yaml')]) == 0
     return bag
 
@@ -82,6 +92,19 @@ def test_frames_to_learn_from_are_spread_over_the_film(struck):
     assert 25 <= len(frames) <= 35
     assert frames[0].shape == (300, 400, 3)
     assert scene_frames(bag, replace(settings, trays_file='')) == {}
+
+
+@pytest.mark.parametrize('scale', [20.0, 1e7])
+def test_rooms_and_microscopes_are_followed(scale, tmp_path, capsys):
+    pytest.importorskip('av')
+    frames, _ = draw(replace(STRUCK, at_rest=0.0, speed=2.0, frames=30))
+    species = f'diameter_mm: {24e3 / scale:g}, look: auto, count: {STRUCK.count}'
+    bag = imported(tmp_path, frames, species, scale=scale)
+    capsys.readouterr()
+    assert main(['track', str(bag), '--json']) == 0
+    counts = json.loads(capsys.readouterr().out)['trays']['1']['species'][0]
+    assert counts['seen'] > 0.97 * STRUCK.count
+    assert counts['tracks'] == STRUCK.count
 
 
 def test_a_film_without_beads_is_done_but_not_usable(tmp_path, capsys):

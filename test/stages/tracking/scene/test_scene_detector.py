@@ -9,7 +9,10 @@ import pytest
 
 from benchmarks.drawn_scenes import DrawnScene, draw
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.records import TrayImage
+from nanorocks_ros.settings import PipelineSettings, PreprocessSettings
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
+from nanorocks_ros.stages.tracking.tracker import Tracker
 
 SCENE = DrawnScene(floor=(60, 120, 50), colours=((210, 210, 215),), frames=40, clutter=True)
 SCALE = 1000.0
@@ -95,3 +98,15 @@ def test_dark_beads_are_not_looked_for_when_bright_ones_are_told():
     columns, rows = np.floor(beads.positions).astype(int).T
     assert 0 < len(beads.radii) < len(truth[0])
     assert (frames[0][rows, columns].mean(axis=1) > 120.0).all()
+
+
+def test_a_gray_camera_is_enough(film):
+    frames, truth = film
+    settings = PipelineSettings(preprocess=PreprocessSettings(pixels_per_metre=SCALE))
+    tracker = Tracker(settings, tray_of(['diameter_mm: 18, look: auto']))
+    for number, frame in enumerate(frames):
+        gray = np.rint(frame.mean(axis=2)).astype(np.uint8)
+        image = TrayImage(stamp_ns=number * 33_000_000, tray=1, gray=gray)
+        tracks = tracker.push(image)[0]
+    assert tracks.seen.sum() == SCENE.count
+    assert distances(SCALE * tracks.positions[tracks.seen], truth[-1]).max() < 0.5
