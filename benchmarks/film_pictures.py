@@ -1,7 +1,7 @@
 """Which films work: drawn films through `nanorocks track`, with its verdicts, in one picture.
 
 Told is a diameter in pixels alone; of rods their number, too. The picture is
-docs/pictures/films.png, on docs/use/films.md.
+docs/pictures/films.jpg, on docs/use/films.md.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from nanorocks_ros.studies.film_import.import_film import import_films
 from nanorocks_ros.studies.inspection.track_overlay import overlay
 from nanorocks_ros.studies.measure.film_tray import FilmedBeads, FilmedTray, described_tray
 
-PICTURE = Path(__file__).resolve().parent.parent / 'docs/pictures/films.png'
+PICTURE = Path(__file__).resolve().parent.parent / 'docs/pictures/films.jpg'
 RATE = 30
 _WORKS = (
     'dark on gray',
@@ -116,7 +116,7 @@ def main():
         np.hstack([np.pad(part, ((4, 4), (4, 4), (0, 0)), constant_values=255) for part in row])
         for row in (panels[k : k + _COLUMNS] for k in range(0, len(panels), _COLUMNS))
     ]
-    cv2.imwrite(str(PICTURE), np.vstack(grid))
+    cv2.imwrite(str(PICTURE), np.vstack(grid), [cv2.IMWRITE_JPEG_QUALITY, 80])
     print(f'\n{PICTURE.name} written')
 
 
