@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Smallest share of the outline that votes, and that the edges on the circle cover.
-_LEAST_VOTES, LEAST_SUPPORT = 0.25, 0.5
+_LEAST_VOTES, _LEAST_SUPPORT = 0.25, 0.5
 _GOOD_SUPPORT = 0.7
 # A disc moves where this share of it differs from the background.
 _MOVING_SHARE = 0.15
@@ -36,14 +36,14 @@ _MOVING_SHARE = 0.15
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 6, 0.1
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
-# And above so many gray levels, and times the noise.
-_LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
 # Circles inside and outside a disc, in radii; and how much more contrast the background has where
 # a bead has left.
 _INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
 _LEFT_CONTRAST = 1.5
 # A step is that of a bead above this part of the usual one: those of shadows are softer.
 _LEAST_STEP = 0.35
+# And above so many gray levels, and times the noise.
+_LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
 # Colours and steps of alike discs: distance to a known one over the spread.
 _ALIKE, _ALIKE_MOVING = 3.0, 6.0
 _KNOWN_SHARE = 0.03
@@ -214,7 +214,7 @@ class SceneModel:
             starts = np.concatenate([starts, hints])
         outlines = fit_outlines(picture, starts, view.voting)
         steps = outlines.steps / view.voting.step
-        good = (outlines.support >= LEAST_SUPPORT) & (steps >= _LEAST_STEP)
+        good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
         good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * self.colours.noise)
         return outlines._replace(steps=steps).chosen(good)
 
