@@ -177,7 +177,8 @@ def _number_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
         nothing = share < _NOTHING
         few, too_few = _NOTHING <= share < _FEW, share < _TOO_FEW
         many = share > _TOO_MANY
-    look, remedy = _contrast_words(counts, scenery)
+    # Where most beads are seen, others are hidden, not of another look.
+    look, remedy = _contrast_words(counts, scenery if nothing or too_few else Scenery())
     return [
         _Fault(nothing, True, FlagWords('nothing_seen', f'no bead was recognised{look}', remedy)),
         _Fault(

@@ -81,6 +81,12 @@ def test_bright_beads_are_named_as_the_reason():
     assert '`look: bright`' in flag.remedy
 
 
+def test_where_most_beads_are_seen_their_look_is_not_blamed():
+    few = replace(GOOD, seen=19.0, complete=0.0)
+    flag = recognition_verdict(few, Scenery(contrast='bright')).flags[0]
+    assert 'brighter' not in flag.text
+
+
 def test_any_number_of_beads_has_no_share():
     verdict = recognition_verdict(replace(GOOD, expected=None, seen=3.3, complete=0.0))
     assert verdict.text == 'tray 1, steel: 3.3 beads seen, mean of 300 frames'
