@@ -84,13 +84,12 @@ def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
+    from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
     from nanorocks_ros.studies.analysis.results_json import as_json
 
     source = Path(options.bags[0])
-    # `.` and `..` have no name of a folder.
-    resolved = source if source.name not in ('', '..') else source.resolve()
-    folder = Path(options.output or f'{resolved}_results')
+    folder = Path(options.output or f'{_stem(Path(options.named[0]))}_results')
     settings, notices, _ = bag_settings(options, source)
     scratch = _scratch_folder() if options.no_output else check_results_folder(folder)
     with Progress('analysing') as progress:
@@ -121,7 +120,16 @@ def _run_one(options: argparse.Namespace) -> int:
         print(written, file=sys.stderr)
     if error is not None:
         raise error
-    return 0
+    return 0 if analysis.usable else EXIT_NOT_USABLE
+
+
+def _stem(named: Path) -> Path:
+    """What the results of a recording are named after; of a video without its ending."""
+    from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES
+
+    # `.` and `..` have no name of a folder.
+    resolved = named if named.name not in ('', '..') else named.resolve()
+    return resolved.with_suffix('') if resolved.suffix in VIDEO_SUFFIXES else resolved
 
 
 def _scratch_folder() -> Path | None:
@@ -137,11 +145,12 @@ def _print(analysis: Analysis) -> None:
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
-        for line in _tray_lines(analysis, results):
+        for line in tray_lines(analysis, results):
             print(f'  {line}')
 
 
-def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
+def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
+    """The cycles of a tray in lines of text."""
     from nanorocks_ros.studies.analysis.cycle_words import (
         cycle_lines,
         is_decay_left_out,
@@ -155,13 +164,14 @@ def _tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
         last_of_each_cycle,
     )
 
+    recognised = [line for verdict in results.verdicts for line in verdict.lines()]
     reason = tray_reason(results)
     if reason is not None:
-        return [f'no COR: {reason.text}; {reason.remedy}']
+        return [*recognised, f'no COR: {reason.text}; {reason.remedy}']
     cycles = last_of_each_cycle(results.cors)
     used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
     ends = ends_of_cycles(results.clusters)
-    lines = [f'priors: {priors_in_words(analysis.prior)}']
+    lines = [*recognised, f'priors: {priors_in_words(analysis.prior)}']
     left_out = 0
     for cor in cycles:
         is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)

@@ -110,7 +110,24 @@ def run_many(options: argparse.Namespace) -> int:
     else:
         _print(batch, combined_results, settings.prior)
     _notice(f'results in {printable(folder)}, report in {printable(report)}')
-    return _report_failures(batch)
+    unusable = _report_unusable(batch)
+    return _report_failures(batch) or unusable
+
+
+def _report_unusable(batch: Batch) -> int:
+    """Name the species that were not recognised; the exit code."""
+    from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
+
+    texts = [
+        f'{result.name}: {verdict["text"]}: NOT USABLE ({verdict["flags"][0]["name"]})'
+        for result in batch.counted
+        for tray in result.summary['trays'].values()
+        for verdict in tray.get('recognition', [])
+        if not verdict['usable']
+    ]
+    for text in texts:
+        _notice(text)
+    return EXIT_NOT_USABLE if texts else 0
 
 
 def _report_failures(batch: Batch) -> int:

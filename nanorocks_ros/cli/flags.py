@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 
+from nanorocks_ros.cli.films import accept_films
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import (
     PipelineSettings,
@@ -52,13 +53,14 @@ def add_bag(
     parser: argparse.ArgumentParser, skip: set[str] | None = None, *, many: bool = False
 ) -> None:
     """Add the arguments of commands that process a bag, with a flag for each setting."""
-    kind = 'rosbag2 folder or .mcap file'
+    kind = 'rosbag2 folder, .mcap file, video or folder of images'
     if many:
         parser.add_argument(
             'bags', nargs='+', metavar='BAG', help=f"{kind}; many, a folder of them, or 'bags/*'"
         )
     else:
         parser.add_argument('bag', help=kind)
+    accept_films(parser, 'bags' if many else 'bag')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument(
         '--image-topic', default='', help='camera topic; default: that of our nodes'

@@ -10,6 +10,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
+from nanorocks_ros.cli.films import use_imports
+from nanorocks_ros.cli.remedies import with_own_files
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ COMMANDS = {
     'info': 'recordings.info',
     'library': 'calibration.library',
     'look': 'look',
+    'measure': 'measure',
     'reproduce': 'reproduce',
     'salvage': 'recordings.salvage',
     'simulate': 'simulation.simulate',
@@ -40,6 +43,7 @@ COMMANDS = {
     'statistics': 'statistics',
     'sweep': 'simulation.sweep',
     'track': 'track',
+    'tray': 'tray',
 }
 """By command, the module of `nanorocks_ros.cli` that adds its parser; in the order of the help."""
 
@@ -63,7 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 after success, 1 for unusable input, 2 for a wrong call, 130 when interrupted.
+        0 after success, 1 for unusable input, 2 for a wrong call, 3 when done with a result that
+        cannot be used, 130 when interrupted.
     """
     # Set before numpy is loaded: arrays here are too small for a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
@@ -72,14 +77,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
     # Its messages about missing fonts are of no use to the user.
     logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
+    options = None
     try:
         options = build_parser().parse_args(arguments)
+        use_imports(options)
         code: int = options.run(options)
     except ConfigurationError as error:
-        print(f'nanorocks: {error}', file=sys.stderr)
+        print(f'nanorocks: {with_own_files(str(error), options)}', file=sys.stderr)
         return EXIT_CALL
     except NanorocksError as error:
-        print(f'nanorocks: {error}', file=sys.stderr)
+        print(f'nanorocks: {with_own_files(str(error), options)}', file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt as interruption:
         message = str(interruption) or 'files written so far can be read'

@@ -25,10 +25,12 @@ _PERCENT = 100.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
+    from nanorocks_ros.cli.film_options import add_film_options
     from nanorocks_ros.cli.flags import add_bag
 
-    parser = commands.add_parser('track', help='track all beads of a bag')
+    parser = commands.add_parser('track', help='track all beads of a film or bag')
     add_bag(parser)
+    add_film_options(parser)
     parser.add_argument('-o', '--output', help='table of the tracks to write, .csv or .parquet')
     parser.add_argument('--picture', help='picture of the last frame with tracks to write, .png')
     parser.add_argument(
@@ -45,6 +47,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
+    from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
     _check_outputs(options)
@@ -56,15 +59,17 @@ def run(options: argparse.Namespace) -> int:
     else:
         _print(bag, compared)
     _write(options, bag)
-    return 0
+    return 0 if bag.usable else EXIT_NOT_USABLE
 
 
 def tracked_bag(options: argparse.Namespace) -> TrackedBag:
     """Track the beads of the bag of the options, with progress; print what is to be known."""
+    from nanorocks_ros.cli.film_options import print_notices, use_described_film
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 
+    print_notices(use_described_film(options, Path(options.bag)))
     settings, assumed, _ = bag_settings(options, options.bag)
     with Progress('tracking') as progress:
         bag = track_bag(
@@ -144,7 +149,7 @@ def _counts(bag: TrackedBag, number: int) -> list[dict[str, Any]]:
         rows.append(
             {
                 'material': species.material,
-                'expected': species.count,
+                'expected': species.expected,
                 'seen': seen / max(len(tracks), 1),
                 'followed': followed / max(len(tracks), 1),
                 'tracks': len(identities),
@@ -154,12 +159,15 @@ def _counts(bag: TrackedBag, number: int) -> list[dict[str, Any]]:
 
 
 def _as_json(bag: TrackedBag, compared: dict[int, TrackComparison]) -> dict[str, Any]:
+    from nanorocks_ros.studies.analysis.recognition_verdicts import verdict_as_json
+
     return {
         'frames': bag.frames,
         'trays': {
             str(number): {
                 'frames': len(bag.tracks[number]),
                 'species': _counts(bag, number),
+                'recognition': [verdict_as_json(row) for row in bag.verdicts.get(number, ())],
                 'comparison': _comparison_as_json(compared.get(number)),
             }
             for number in bag.trays
@@ -196,13 +204,21 @@ def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
     for number in bag.trays:
         print(f'tray {number}: {len(bag.tracks[number])} frames tracked')
         for row in _counts(bag, number):
-            share = _PERCENT * row['seen'] / row['expected']
-            print(
-                f'  {row["material"]}: {row["seen"]:.1f} of {row["expected"]} seen '
-                f'({share:.0f} %), {row["followed"]:.1f} followed, {row["tracks"]} tracks'
-            )
+            print(f'  {row["material"]}: {_seen(row)}, {row["tracks"]} tracks')
+        for verdict in bag.verdicts.get(number, ()):
+            for line in verdict.lines():
+                print(f'  {line}')
         if number in compared:
             _print_comparison(compared[number])
+
+
+def _seen(row: dict[str, Any]) -> str:
+    """Beads seen and followed, with the share where their number is known."""
+    followed = f'{row["followed"]:.1f} followed'
+    if row['expected'] is None:
+        return f'{row["seen"]:.1f} seen, {followed}'
+    share = _PERCENT * row['seen'] / row['expected']
+    return f'{row["seen"]:.1f} of {row["expected"]} seen ({share:.0f} %), {followed}'
 
 
 def _print_comparison(comparison: TrackComparison) -> None:

@@ -113,7 +113,8 @@ def describe(tray: Tray | None) -> str:
     for species in tray.species:
         low, high = 1e3 * species.diameter_low, 1e3 * species.diameter_high
         size = f'{low:.3g}' if low == high else f'{low:.3g} to {high:.3g}'
-        kinds.append(f'{species.count} {species.material} {size} mm')
+        count = 'any number of' if species.expected is None else species.expected
+        kinds.append(f'{count} {species.material} {size} mm')
     return clean(', '.join(kinds) + (', with chalk' if tray.chalk else ''), _LONGEST_TEXT)
 
 

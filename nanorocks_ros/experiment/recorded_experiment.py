@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.calibration_file import load_calibration
+from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.yaml_lines import file_content
 from nanorocks_ros.settings import PipelineSettings, problem, rows, with_values
@@ -117,7 +118,10 @@ def recorded_settings(
     notices = _contradictions(given, set(told), stored, place)
     replaced: set[str] = set().union(*(_REPLACED.get(name, set()) for name in told))
     values = {name: value for name, value in stored.items() if name not in replaced}
-    trays_known = _TRAYS in told or _TRAYS in stored
+    own = values.get(_TRAYS_FILE, given[_TRAYS_FILE])
+    of_single_tray = _of_single_tray(own) if _TRAYS not in {*told, *stored} else {}
+    values |= of_single_tray
+    trays_known = bool(of_single_tray) or _TRAYS in told or _TRAYS in stored
     if not trays_known:
         notices.append(
             f'{place}: does not say which trays it shows; '
@@ -128,7 +132,23 @@ def recorded_settings(
         regions = _regions(settings.trays if _TRAYS in told else stored[_TRAYS], stored)
         values.pop(_REGIONS)
         values |= {_REGIONS: regions} if regions else {}
+    # A file that was made for the film says more of it than the recording.
+    values |= {
+        name: value for name, value in _of_film(own).items() if name not in {*replaced, *told}
+    }
     return RecordedSettings(with_values(settings, values, place), tuple(notices), trays_known)
+
+
+def _of_single_tray(trays_file: str) -> dict[str, Any]:
+    """The number of the tray where a file describes a single one; else nothing."""
+    numbers = sorted(load_trays(trays_file)) if trays_file else []
+    return {_TRAYS: numbers} if len(numbers) == 1 else {}
+
+
+def _of_film(trays_file: str) -> dict[str, Any]:
+    """What a trays file says of its film."""
+    section = film_section(trays_file)
+    return {} if section is None else section.settings()
 
 
 def experiment_key(name: str) -> str:

@@ -1,22 +1,28 @@
-"""The sample cells and their beads ([B19] table 1), checked when loaded."""
+"""The trays of a file, checked when loaded; by default those of the flight ([B19] table 1)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.appearance import Appearance, read_appearance
+from nanorocks_ros.experiment.film_section import SECTION
 from nanorocks_ros.experiment.materials import (
     GRAM_PER_CUBIC_CENTIMETRE,
+    Look,
     Material,
     MaterialReader,
     known_materials,
     paste_remedy,
 )
+from nanorocks_ros.experiment.tray_cells import Polygon
+from nanorocks_ros.experiment.tray_cells import Species as Species
+from nanorocks_ros.experiment.tray_cells import Tray as Tray
 from nanorocks_ros.experiment.yaml_lines import (
     YamlLines,
     file_content,
@@ -29,108 +35,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MILLIMETRE = 1e-3
+# Beads of a species that is not counted: what fits side by side, and not more than these.
+_MAX_UNCOUNTED = 2000
+_UNKNOWN_COLOR = 90.0, 90.0, 90.0
 GRAM = 1e-3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Species:
-    """Beads of one material in one tray.
-
-    Parameters
-    ----------
-    properties : Material
-        What the beads are made of.
-    diameter_low, diameter_high : float, [m]
-        Ends of the range of diameters; equal when all beads are alike.
-    count : int
-    mass : float or None, [kg]
-        Total mass, where the paper gives that instead of a count.
-    """
-
-    properties: Material
-    diameter_low: float
-    diameter_high: float
-    count: int
-    mass: float | None = None
-
-    @property
-    def material(self) -> str:
-        """Name of the material."""
-        return self.properties.name
-
-    @property
-    def density(self) -> float:
-        """Density of the material, [kg/m^3]."""
-        return self.properties.density
-
-    @property
-    def diameter(self) -> float:
-        """Middle of the range of diameters, [m]."""
-        return 0.5 * (self.diameter_low + self.diameter_high)
-
-    @property
-    def bead_mass(self) -> float:
-        """Mass of a bead of the middle diameter, [kg]."""
-        return self.density * math.pi / 6.0 * self.diameter**3
-
-    @property
-    def count_from_mass(self) -> float | None:
-        """Number of beads of the middle diameter that weigh `mass`."""
-        return None if self.mass is None else self.mass / self.bead_mass
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tray:
-    """One sample cell.
-
-    Parameters
-    ----------
-    number : int
-    dimensions : tuple of 3 floats, [m]
-        Inner length, width and height; the camera looks along the height.
-    species : tuple of Species
-    chalk : bool
-        Whether the beads were breaded with chalk dust.
-    place : tuple of 2 floats or None, [m]
-        Corner of the cell nearest to the upper left one of the plate, along columns and rows of
-        the picture; None for a cell that lies on no plate.
-    """
-
-    number: int
-    dimensions: tuple[float, float, float]
-    species: tuple[Species, ...]
-    chalk: bool
-    place: tuple[float, float] | None = None
-
-    @property
-    def count(self) -> int:
-        """Number of beads of all species."""
-        return sum(species.count for species in self.species)
-
-    @property
-    def materials(self) -> dict[str, Material]:
-        """Materials of the beads, by name."""
-        return {species.material: species.properties for species in self.species}
-
-    @property
-    def volume(self) -> float:
-        """Inner volume, [m^3]."""
-        return math.prod(self.dimensions)
-
-    @property
-    def number_density(self) -> float:
-        """Beads per volume, [1/m^3]."""
-        return self.count / self.volume
-
-    @property
-    def diameter(self) -> float:
-        """Mean bead diameter over all beads, [m]."""
-        return sum(species.count * species.diameter for species in self.species) / self.count
-
-    @property
-    def mean_mass(self) -> float:
-        """Mean mass of a bead, [kg]."""
-        return sum(species.count * species.bead_mass for species in self.species) / self.count
 
 
 def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
@@ -170,6 +78,10 @@ def _species_values(species: Species) -> dict[str, Any]:
         'mass': species.mass,
     }
     known = known_materials().get(species.material)
+    if not species.counted:
+        values['counted'] = False
+    if species.appearance is not None:
+        values['appearance'] = asdict(species.appearance)
     if known is None or species.properties != replace(known, density=species.density):
         values['properties'] = asdict(species.properties)
     return values
@@ -189,13 +101,34 @@ def tray_by_number(trays: Mapping[int, Tray], number: int) -> Tray:
     return trays[number]
 
 
+def require_measurable(tray: Tray) -> None:
+    """Check that restitutions can be measured in a tray, not only beads followed.
+
+    Raises
+    ------
+    ConfigurationError
+        When its height, or count or density of a species, is not known.
+    """
+    missing = ['height (third of dimensions_mm)'] * math.isnan(tray.dimensions[2])
+    for species in tray.species:
+        missing += [f'count of {species.material}'] * (not species.counted)
+        missing += [f'density of {species.material}'] * math.isnan(species.density)
+    if missing:
+        raise ConfigurationError(
+            f'tray {tray.number}',
+            f'the trays file does not tell {", ".join(missing)}',
+            'add it (a density under "densities_g_cm3:"), or follow the beads with '
+            '`nanorocks track`',
+        )
+
+
 class _TrayFile(YamlLines):
     """Trays from the nodes of a file."""
 
     def trays(self, root: yaml.Node | None) -> dict[int, Tray]:
         if root is None:
             raise self.error(None, 'is empty', 'describe at least one tray under "trays:"')
-        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials'})
+        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials', SECTION})
         self._read_materials(top)
         trays = {}
         for key, node in self.pairs(top['trays']):
@@ -239,16 +172,14 @@ class _TrayFile(YamlLines):
         return key
 
     def _tray(self, number: int, node: yaml.Node) -> Tray:
-        entry = self.mapping(node, {'dimensions_mm', 'species'}, {'chalk', 'place_mm'})
+        entry = self.mapping(
+            node, {'dimensions_mm', 'species'}, {'chalk', 'place_mm', 'inside_mm', 'masks_mm'}
+        )
         sides = self._lengths(entry['dimensions_mm'])
-        if len(sides) != 3:
-            raise self.error(
-                entry['dimensions_mm'], f'{len(sides)} dimensions', 'give length, width, height'
-            )
         if not isinstance(entry['species'], yaml.SequenceNode) or not entry['species'].value:
             raise self.error(entry['species'], 'species is no list', 'list at least one')
         nodes = entry['species'].value
-        species = tuple(self._species(item) for item in nodes)
+        species = tuple(self._species(item, sides) for item in nodes)
         for item, beads in zip(nodes, species, strict=True):
             if beads.diameter_high > min(sides) * MILLIMETRE * (1.0 + 1e-12):
                 raise self.error(
@@ -257,13 +188,38 @@ class _TrayFile(YamlLines):
                     f'{min(sides):g} mm',
                     'correct the diameter or the dimensions',
                 )
+        # Following beads that are learnt from the film needs no height.
+        flat = len(sides) == 2 and all(beads.appearance is not None for beads in species)
+        if len(sides) != 3 and not flat:
+            raise self.error(
+                entry['dimensions_mm'], f'{len(sides)} dimensions', 'give length, width, height'
+            )
         return Tray(
             number=number,
-            dimensions=(sides[0] * MILLIMETRE, sides[1] * MILLIMETRE, sides[2] * MILLIMETRE),
+            dimensions=(
+                sides[0] * MILLIMETRE,
+                sides[1] * MILLIMETRE,
+                sides[2] * MILLIMETRE if len(sides) == 3 else math.nan,
+            ),
             species=species,
             chalk=self._flag(entry.get('chalk')),
             place=self._place(entry.get('place_mm')),
+            inside=self._polygon(entry['inside_mm']) if 'inside_mm' in entry else None,
+            masks=self._masks(entry.get('masks_mm')),
         )
+
+    def _masks(self, node: yaml.Node | None) -> tuple[Polygon, ...]:
+        return () if node is None else tuple(self._polygon(item) for item in self.listed(node))
+
+    def _polygon(self, node: yaml.Node) -> Polygon:
+        corners = [
+            [self.number(item) for item in self.listed(corner)] for corner in self.listed(node)
+        ]
+        if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
+            raise self.error(
+                node, 'is no polygon', 'give three corners or more: [[0, 0], [5, 0], [5, 2]]'
+            )
+        return tuple((x * MILLIMETRE, y * MILLIMETRE) for x, y in corners)
 
     def _place(self, node: yaml.Node | None) -> tuple[float, float] | None:
         if node is None:
@@ -273,22 +229,55 @@ class _TrayFile(YamlLines):
             raise self.error(node, f'a place of {place}', 'give column and row, 0 or more')
         return place[0] * MILLIMETRE, place[1] * MILLIMETRE
 
-    def _species(self, node: yaml.Node) -> Species:
-        entry = self.mapping(node, {'material', 'diameter_mm', 'count'}, {'mass_g'})
-        material = self._material(entry['material'])
+    def _species(self, node: yaml.Node, sides: list[float]) -> Species:
+        entry = self.mapping(
+            node, {'diameter_mm'}, {'material', 'count', 'mass_g', 'look', 'colour'}
+        )
+        appearance = read_appearance(self, entry.get('look'), entry.get('colour'))
+        material, appearance = self._material_of(node, entry.get('material'), appearance)
+        if 'count' not in entry and appearance is None:
+            raise self.error(node, 'lacks count', 'add it, or "look: auto" to find any number')
         diameters = self._lengths(entry['diameter_mm'])
         if len(diameters) not in (1, 2) or diameters[0] > diameters[-1]:
             raise self.error(
                 entry['diameter_mm'], f'diameter {diameters}', 'give one, or the lower and upper'
             )
         mass = entry.get('mass_g')
+        fitting = min(_MAX_UNCOUNTED, max(1, int(math.prod(sides[:2]) / diameters[0] ** 2)))
         return Species(
             diameter_low=diameters[0] * MILLIMETRE,
             diameter_high=diameters[-1] * MILLIMETRE,
-            count=self._count(entry['count']),
+            count=self._count(entry['count']) if 'count' in entry else fitting,
             mass=None if mass is None else self.positive(mass) * GRAM,
             properties=material,
+            counted='count' in entry,
+            appearance=appearance,
         )
+
+    def _material_of(
+        self, node: yaml.Node, name: yaml.Node | None, appearance: Appearance | None
+    ) -> tuple[Material, Appearance | None]:
+        """The material of a species, described or not, and its look.
+
+        Materials of the flight have the look of the flight, unless it is told; others are learnt.
+        """
+        if name is None:
+            if appearance is None:
+                raise self.error(node, 'lacks material', 'add it, or "look: auto" for any beads')
+            return self._undescribed('bead', appearance), appearance
+        word = str(self.scalar(name))
+        if appearance is not None and word not in self._materials:
+            return self._undescribed(word, appearance), appearance
+        material = self._material(name)
+        flown = word in known_materials() and appearance is None
+        return material, None if flown else appearance or Appearance()
+
+    def _undescribed(self, name: str, appearance: Appearance) -> Material:
+        """A material of which only the look is told."""
+        told = appearance.colour or _UNKNOWN_COLOR
+        density = self._densities.get(name, math.nan) * GRAM_PER_CUBIC_CENTIMETRE
+        look = Look(blue=told[0], green=told[1], red=told[2])
+        return Material(name=name, density=density, color=told, look=look)
 
     def _lengths(self, node: yaml.Node) -> list[float]:
         return [self.positive(item) for item in self.listed(node)]

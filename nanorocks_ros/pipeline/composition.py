@@ -8,7 +8,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.calibration_file import calibrated
-from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.experiment.trays import (
+    load_trays,
+    require_measurable,
+    tray_by_number,
+)
 from nanorocks_ros.pipeline.changed_settings import Part
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement, TrayRecord
 from nanorocks_ros.records import (
@@ -149,6 +153,8 @@ class Pipeline:
     def __init__(self, settings: PipelineSettings, camera: str, view: View | None = None) -> None:
         settings = calibrated(settings)
         trays = trays_of(settings)
+        for tray in trays.values():
+            require_measurable(tray)
         self.preprocessor = Preprocessor(settings, trays, camera, view)
         self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
 

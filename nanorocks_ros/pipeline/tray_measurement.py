@@ -29,10 +29,14 @@ from nanorocks_ros.stages.speed.structure_speed import StructureSpeed
 from nanorocks_ros.stages.speed.track_speed import TrackSpeed
 from nanorocks_ros.stages.speed.tray_oscillation import TrayOscillation
 from nanorocks_ros.stages.stage import RestartingStage
+from nanorocks_ros.stages.tracking.recognition_counts import RecognitionCounter
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
@@ -69,6 +73,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         Also emit a :class:`MotionMask` per image; off by default.
     emit_tracks : bool
         Also emit the :class:`Tracks` of each image, where they are made; off by default.
+    recognition : RecognitionCounter
+        How well the beads have been recognised since the start.
     """
 
     clock = TrayImage
@@ -78,7 +84,13 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._tray = tray
         self.emit_mask = False
         self.emit_tracks = False
+        self._lesson: Sequence[NDArray[np.uint8]] = ()
         self.reset()
+
+    def learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        """Learn the look of the beads from frames of the whole film; see `Tracker.learn`."""
+        self._lesson = frames
+        self._tracker.learn(frames)
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         del stamp_ns
@@ -89,7 +101,10 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self._cycle: tuple[int, int | None] = (0, None)
         self._oscillation = TrayOscillation()
         self._tracker = Tracker(settings, tray)
+        if self._lesson:
+            self._tracker.learn(self._lesson)
         drag = Measured(settings.prior.drag, settings.prior.drag_error)
+        self.recognition = RecognitionCounter(tray, crowded=self._tracker.crowded)
         self._contacts = ContactFinder(tray, drag)
         self._bodies = BodyCounter(settings, tray)
         self._scale = ScaleCheck(settings, tray)
@@ -120,6 +135,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             speeds += self._track_speed.push(image)
             for tracks in self._tracker.push(image):
                 pictures += [tracks] if self.emit_tracks else []
+                self.recognition.push(tracks, self._tracker.max_speed)
                 notices += self._camera_notices(image, tracks)
                 contacts = self._contacts_in(tracks)
                 notices += self._scale_notices(tracks, contacts)

@@ -43,7 +43,7 @@ class Tracks:
     seen : ndarray of bool, (n,)
         False where the bead is hidden and its place is predicted.
     expected : ndarray of int32, (species,)
-        Beads of each species that the tray should show.
+        Beads of each species that the tray should show; 0 where any number may be there.
     quality : Quality
         That of the image, and FEW_BEADS where much of a species is not seen.
     cycle : int

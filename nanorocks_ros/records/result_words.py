@@ -121,7 +121,7 @@ FLAGS = {
 NO_SHAKING = Words(
     'no shaking event was seen',
     'film the shaking and the rest before it; if the film shows it, lower --speed-shake-ratio '
-    'or --preprocess-shake-speed',
+    'or --preprocess-shake-speed; contacts alone need none: nanorocks measure FILM',
 )
 NO_SPEEDS = Words('no speed could be measured', _LOOK)
 METHODS = {

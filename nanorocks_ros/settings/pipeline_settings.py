@@ -38,7 +38,7 @@ class PreprocessSettings:
         'calibration file with lens, regions and scale; it replaces `regions_px`, `layout`, '
         '`pixels_per_metre` and camera_info; empty: none',
     )
-    pixels_per_metre: float = setting(13500.0, 'image scale', 'px/m', low=100.0, high=1e6)
+    pixels_per_metre: float = setting(13500.0, 'image scale', 'px/m', low=1.0, high=1e9)
     gray_mix: tuple[float, ...] = setting(
         (0.45, 0.45, 0.10), 'weights of blue, green and red in the gray mix', low=0.0, high=1.0
     )
@@ -186,12 +186,13 @@ class TrackingSettings:
         high=60.0,
     )
     max_speed: float = setting(
-        0.05,
-        'largest projected speed a bead may have when linking',
+        0.0,
+        'largest projected speed a bead may have when linking; 0: 0.05 for beads of the flight, '
+        'half of the distance of neighbours between frames for beads that are learnt',
         'm/s',
         deprecated='fastest',
-        low=1e-4,
-        high=10.0,
+        low=0.0,
+        high=100.0,
     )
     window: float = setting(
         1.0, 'longest piece of a track that a velocity is fitted to', 's', low=0.05, high=10.0

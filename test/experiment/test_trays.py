@@ -9,7 +9,12 @@ from pathlib import Path
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+from nanorocks_ros.experiment.appearance import Appearance
+from nanorocks_ros.experiment.trays import (
+    load_trays,
+    require_measurable,
+    tray_by_number,
+)
 
 PAPER = json.loads((Path(__file__).parents[1] / 'paper_values.json').read_text())
 
@@ -82,6 +87,56 @@ def test_a_user_file_is_read(tmp_path):
     assert load_trays(path)[1].count == 15
 
 
+def test_beads_of_the_flight_have_its_look_unless_it_is_told(tmp_path):
+    assert not any(tray.is_learnt for tray in load_trays().values())
+    path = tmp_path / 'mine.yaml'
+    path.write_text(GOOD.replace('count: 15', 'count: 15, look: bright'))
+    assert load_trays(path)[1].species[0].appearance == Appearance(sign=1)
+
+
+def test_other_beads_are_learnt_from_the_film(tmp_path):
+    path = tmp_path / 'mine.yaml'
+    steel = 'materials: {steel: {density_g_cm3: 7.8, color_bgr: [90, 90, 90]}}\n'
+    path.write_text(steel + GOOD.replace('acrylic, d', 'steel, d'))
+    tray = load_trays(path)[1]
+    assert tray.is_learnt
+    assert tray.species[0].appearance == Appearance()
+    assert tray.species[0].expected == 15
+
+
+def test_beads_may_be_followed_by_diameter_and_look_alone():
+    tray = load_trays(
+        'trays:\n'
+        '  1:\n'
+        '    dimensions_mm: [300, 200]\n'
+        '    inside_mm: [[10, 10], [290, 10], [290, 190], [10, 190]]\n'
+        '    masks_mm: [[[140, 0], [160, 0], [150, 20]]]\n'
+        '    species:\n'
+        '      - {diameter_mm: [9, 11], look: auto, colour: "#c03020"}\n'
+    )[1]
+    species = tray.species[0]
+    assert species.appearance == Appearance(sign=0, colour=(32.0, 48.0, 192.0))
+    assert (species.material, species.expected) == ('bead', None)
+    assert species.count == 740
+    assert math.isnan(species.density)
+    assert math.isnan(tray.dimensions[2])
+    assert tray.inside[1] == pytest.approx((0.29, 0.01))
+    assert len(tray.masks[0]) == 3
+
+
+def test_restitutions_need_more_than_following_beads():
+    for tray in load_trays().values():
+        require_measurable(tray)
+    text = (
+        'trays:\n  1:\n    dimensions_mm: [30, 20]\n'
+        '    species:\n      - {material: lead, look: auto, diameter_mm: 2}\n'
+    )
+    with pytest.raises(ConfigurationError, match=r'height .* count of lead, density of lead; add'):
+        require_measurable(load_trays(text)[1])
+    whole = text.replace('20]', '20, 3]').replace('mm: 2}', 'mm: 2, count: 5}')
+    require_measurable(load_trays('densities_g_cm3: {lead: 11.3}\n' + whole)[1])
+
+
 def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
     with pytest.raises(ConfigurationError, match=r'tray 9: does not exist; choose one of 1, 2, 3'):
         tray_by_number(load_trays(), 9)
@@ -105,8 +160,20 @@ def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
         ),
         ('{acrylic: 1.18}', '{acrylic: 0}', ':1: 0 is no positive number'),
         (', count: 15', '', r':6: lacks count; add it'),
-        ('count: 15', 'count: 15, colour: red', r":6: unknown entry 'colour'; use count"),
+        ('count: 15', 'count: 15, hue: red', r":6: unknown entry 'hue'; use colour, count"),
         ('[15, 15, 3]', '[15, 15]', r':4: 2 dimensions; give length, width, height'),
+        (
+            'count: 15',
+            'count: 15, look: shiny',
+            r":6: unknown look 'shiny'; use auto, bright, dark",
+        ),
+        ('count: 15', 'count: 15, colour: mauve', r":6: unknown colour 'mauve'; use auto, black"),
+        ('material: acrylic, ', '', r':6: lacks material; add it, or "look: auto"'),
+        (
+            '[15, 15, 3]',
+            '[15, 15, 3]\n    masks_mm: [[[0, 0], [1, 1]]]',
+            r':5: is no polygon; give',
+        ),
         ('  1:', '  one:', r":4: tray number 'one'; number the trays"),
         ('trays:', 'trays: [', r':\d+: not YAML'),
         ('species:', 'species: none', r':\d+: (not YAML|species is no list)'),

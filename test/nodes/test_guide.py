@@ -134,7 +134,14 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
     assert re.search(r'cycle 1: COR 0\.\d+', outputs['nanorocks analyse my_film'])
     assert '/nanorocks/tray_1/cor' in outputs['nanorocks info rehearsal']
     assert '/nanorocks/pipeline' in outputs['nanorocks doctor --graph']
-    for made in ('steps.png', 'decay.png', 'mine.png', 'my_film_results/tray_1_cor.csv'):
+    quick = outputs['nanorocks measure film.avi --diameter-px 27 -o quick']
+    assert re.search(r'15\.\d beads seen.*: usable', quick)
+    assert re.search(r'walls, by rebounds alone: 0\.9\d+', quick)
+    measured = outputs['nanorocks measure film.avi --tray mine.yaml -o measured']
+    assert 'library: ' not in measured, 'the library of the package is of this tray'
+    assert re.search(r'decay: cycle 1: COR 0\.\d+', measured)
+    files = ('quick/report.html', 'measured/report.html', 'my_film_results/tray_1_cor.csv')
+    for made in ('steps.png', 'decay.png', 'mine.png', *files):
         assert (tmp_path / made).stat().st_size > 0
     report = (tmp_path / 'results/report.html').read_text(encoding='utf-8')
     assert 'run 1' in report

@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.films import accept_films
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import finite_or_none
 
@@ -25,7 +26,8 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         'calibrate', help='estimate lens and tray regions from a recording of the trays'
     )
-    parser.add_argument('recording', help='rosbag2 folder or .mcap file')
+    parser.add_argument('recording', help='rosbag2 folder, .mcap file, video or folder of images')
+    accept_films(parser, 'recording')
     parser.add_argument('-o', '--output', help='calibration file to write, YAML')
     parser.add_argument('--picture', help='picture of the calibration to write, PNG')
     parser.add_argument(

@@ -20,8 +20,13 @@ _MB = 1e6
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
+    from nanorocks_ros.cli.films import accept_films
+
     parser = commands.add_parser('info', help='show the contents of a bag and its problems')
-    parser.add_argument('bag', help='rosbag2 folder, .mcap or .db3 file')
+    parser.add_argument(
+        'bag', help='rosbag2 folder, .mcap or .db3 file, video or folder of images'
+    )
+    accept_films(parser, 'bag')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.set_defaults(run=run)
 

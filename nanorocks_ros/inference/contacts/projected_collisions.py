@@ -123,6 +123,8 @@ def _tilts(
     room = np.minimum(free.min(axis=1)[:, None], 0.5 * free.sum(axis=1)[:, None] - above)
     square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None])
               / seen.distance_error[:, None]) ** 2  # fmt: skip
+    # In a tray as high as a bead all lines of centres are level.
+    room[:, 0] = np.where(room.max(axis=1) > 0.0, room[:, 0], 1.0)
     weight = np.maximum(room, 0.0) * np.exp(-0.5 * (square - square.min(axis=1)[:, None]))
     return tilt, weight / weight.sum(axis=1)[:, None]
 

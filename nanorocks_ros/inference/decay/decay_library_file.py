@@ -85,7 +85,7 @@ def library_of(tray: Tray, path: str | Path = '') -> DecayLibrary:
             where,
             f'the decay library is of a tray with other beads or sides than tray {tray.number}',
             f'make one: {build_command(tray)}, and pass it as cooling.decay_library; or choose '
-            'cooling.relation paper',
+            'cooling.relation paper, or measure contacts alone: nanorocks measure FILM',
         )
     return library
 

@@ -140,9 +140,7 @@ def fit_library(
         sd = np.maximum(error[:, k], _LEAST_ERROR * np.median(error[:, k]))
         target = mean[:, k] + np.log1p(decay)
         matrix = design.terms(decay)
-        coefficients[:, k] = np.linalg.lstsq(matrix / sd[:, np.newaxis], target / sd, rcond=_ZERO)[
-            0
-        ]
+        coefficients[:, k] = _fitted(tray, matrix / sd[:, np.newaxis], target / sd)
         residual = target - matrix @ coefficients[:, k]
         excess += float(np.mean(residual**2) - np.mean(error[:, k] ** 2) * (1.0 - terms / nodes))
     library = DecayLibrary(
@@ -160,10 +158,32 @@ def fit_library(
         friction_coefficients=np.empty((0, x.size)),
         friction_misfit=0.0,
     )
-    return library if rough is None else _with_friction(library, rough)
+    return library if rough is None else _with_friction(tray, library, rough)
 
 
-def _with_friction(library: DecayLibrary, decays: Decays) -> DecayLibrary:
+def _fitted(
+    tray: Tray, matrix: NDArray[np.float64], target: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Coefficients by least squares.
+
+    Raises
+    ------
+    FitError
+        When decays are not finite: a bead or two need not collide in all runs.
+    """
+    try:
+        if np.isfinite(matrix).all() and np.isfinite(target).all():
+            return np.asarray(np.linalg.lstsq(matrix, target, rcond=_ZERO)[0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        pass
+    raise FitError(
+        f'decay library of tray {tray.number}',
+        f'the decays of {tray.count} beads follow no smooth function',
+        'use contacts alone, which need no library: nanorocks measure FILM',
+    )
+
+
+def _with_friction(tray: Tray, library: DecayLibrary, decays: Decays) -> DecayLibrary:
     """A library of smooth beads with what friction adds."""
     nodes, runs, n_x = decays.log_speed.shape
     if runs < 2 or nodes < fewest_rough_nodes():
@@ -192,9 +212,9 @@ def _with_friction(library: DecayLibrary, decays: Decays) -> DecayLibrary:
     for k, distance in enumerate(library.distances):
         offset, matrix = rough_design(terms, rate * distance, rubbing * distance)
         target = added[:, k] - offset
-        coefficients[:, k] = np.linalg.lstsq(
-            weight[:, k, np.newaxis] * matrix, weight[:, k] * target, rcond=_ZERO
-        )[0]
+        coefficients[:, k] = _fitted(
+            tray, weight[:, k, np.newaxis] * matrix, weight[:, k] * target
+        )
         freedom = 1.0 - len(coefficients) / nodes
         excess[:, k] = (target - matrix @ coefficients[:, k]) ** 2 - freedom * error[:, k] ** 2
     typical = (mean > _FAINT) & (decays.floor_lid_restitution < _ELASTIC)[:, np.newaxis]

@@ -61,6 +61,17 @@ def is_collection(path: Path) -> bool:
         return False
 
 
+def is_recording(path: Path) -> bool:
+    """Whether a path is a bag or a storage file, whole or not.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    return _is_bag(path) if path.is_dir() else _is_storage(path)
+
+
 def find_bags(inputs: Sequence[str]) -> FoundBags:
     """Find the recordings that the inputs refer to.
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.records import (
     Contact,
     ContactOrFlight,
@@ -18,7 +17,12 @@ from nanorocks_ros.records import (
     Tracks,
 )
 from nanorocks_ros.stages.contacts.flight_segments import FlightSegments, VelocityJump
-from nanorocks_ros.stages.contacts.line_fits import Intersection, intersect_lines
+from nanorocks_ros.stages.contacts.line_fits import (
+    Intersection,
+    are_straight,
+    contact_position,
+    intersect_lines,
+)
 from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_isolated_collision
 from nanorocks_ros.stages.contacts.track_buffer import MAX_FLIGHT_POINTS
 from nanorocks_ros.stages.contacts.tray_history import TrayHistory
@@ -39,8 +43,6 @@ _NS = 1e9
 # one), and longest gap at a contact.
 _MAX_GAP_FRAMES = 3.5
 _MAX_CONTACT_FRAMES = 1.5
-# Largest excess of chi square of a flight, in standard deviations: noise exceeds it once in 1000.
-_MAX_CHI_SQUARE_SIGMAS = 4.0
 # Tolerance of the distance to the wall at a rebound, in radii; and distance of two beads at a
 # collision, in sums of radii: nearer beads overlap in the image, and their positions are biased.
 _WALL_TOLERANCE = 0.15
@@ -62,20 +64,29 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
     tray : Tray
     drag : Measured, optional, [1/s]
         Prior of the drag of the gas.
+    acceleration : tuple of 2 floats, optional, [m/s^2]
+        Of all beads between contacts, as by gravity; along columns and rows.
     """
 
     clock = Tracks
 
-    def __init__(self, tray: Tray, drag: Measured = _UNKNOWN_DRAG) -> None:
+    def __init__(
+        self,
+        tray: Tray,
+        drag: Measured = _UNKNOWN_DRAG,
+        acceleration: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
         self._tray = tray
         self._prior = drag
+        self._acceleration = np.array(acceleration)
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         """Forget all tracks; contacts that are held back are lost."""
         del stamp_ns
         self._first_ns: int | None = None
-        self._segments = FlightSegments(self._tray)
+        x, y = self._acceleration.tolist()
+        self._segments = FlightSegments(self._tray, (x, y))
         self._history = TrayHistory(3 * MAX_FLIGHT_POINTS)
         self._unmatched = UnmatchedJumps()
         self._drag = RunningDrag(self._prior)
@@ -118,12 +129,17 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         return (*contacts, *self._flights())
 
     def _mass(self, jump: VelocityJump) -> float:
-        return self._tray.species[jump.species].density * 4.0 / 3.0 * math.pi * jump.radius**3
+        """Mass of a bead, [kg]; of density 1 where one is not known, since ratios count."""
+        density = self._tray.species[jump.species].density
+        if any(math.isnan(species.density) for species in self._tray.species):
+            density = 1.0
+        return density * 4.0 / 3.0 * math.pi * jump.radius**3
 
     def _contact_at(self, jump: VelocityJump) -> tuple[Contact, ...]:
         crossing = Intersection(*intersect_lines(jump.lines[None]))
-        if not (_are_straight(jump.lines) and self._is_between_frames(jump, crossing)):
+        if not (are_straight(jump.lines) and self._is_between_frames(jump, crossing)):
             return ()
+        jump = jump.at(crossing.time, self._acceleration)
         rebound = self._rebound(jump, crossing)
         if rebound is not None:
             return (rebound,)
@@ -146,7 +162,7 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         return (self._first_ns or 0) + round(time * _NS)
 
     def _rebound(self, jump: VelocityJump, crossing: Intersection) -> Rebound | None:
-        x, y, variance = _contact_position(jump.lines, crossing.time)
+        x, y, variance = contact_position(jump.lines, crossing.time)
         shift_x, shift_y = self._history.displacement(crossing.time)
         position = x - shift_x, y - shift_y
         slack = _WALL_TOLERANCE * jump.radius + MAX_SIGMAS * math.sqrt(variance)
@@ -210,15 +226,18 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         beads = np.empty((len(jumps), 4))
         for bead, jump in zip(beads, jumps, strict=True):
             speed = max(math.hypot(*line[3:5]) for line in jump.lines.tolist())
-            bead[:] = *_contact_position(jump.lines, crossing.time)[:2], jump.radius, speed
+            bead[:] = *contact_position(jump.lines, crossing.time)[:2], jump.radius, speed
         return self._history.is_isolated(crossing.time, [jump.track for jump in jumps], beads)
 
     def _pair(self, jumps: tuple[VelocityJump, VelocityJump]) -> PairCollision | None:
+        middle = 0.5 * (jumps[0].origin + jumps[1].origin)
+        jumps = self._both_at(jumps, middle)
         crossing = Intersection(*intersect_lines(np.array([jump.lines for jump in jumps])))
+        jumps = self._both_at(jumps, crossing.time)
         if not all(self._is_between_frames(jump, crossing) for jump in jumps):
             return None
         (x, y, _), (second_x, second_y, _) = (
-            _contact_position(jump.lines, crossing.time) for jump in jumps
+            contact_position(jump.lines, crossing.time) for jump in jumps
         )
         distance = math.hypot(second_x - x, second_y - y)
         reach = jumps[0].radius + jumps[1].radius
@@ -231,10 +250,15 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         collision = self._collision_record(jumps, crossing)
         return collision if is_isolated_collision(collision) else None
 
+    def _both_at(
+        self, jumps: tuple[VelocityJump, VelocityJump], time: float
+    ) -> tuple[VelocityJump, VelocityJump]:
+        return jumps[0].at(time, self._acceleration), jumps[1].at(time, self._acceleration)
+
     def _collision_record(
         self, jumps: tuple[VelocityJump, VelocityJump], crossing: Intersection
     ) -> PairCollision:
-        positions = [_contact_position(jump.lines, crossing.time) for jump in jumps]
+        positions = [contact_position(jump.lines, crossing.time) for jump in jumps]
         first, second = (np.array(position[:2]) for position in positions)
         before = np.array([jump.before.velocity for jump in jumps])
         approach = before[1] - before[0]
@@ -271,32 +295,6 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         )
 
 
-@compiled
-def _contact_position(lines: NDArray[np.float64], time: float) -> tuple[float, float, float]:
-    """Position of the bead at the contact from both flights, and the variance of a coordinate."""
-    before, after = lines[0], lines[1]
-    since_before, since_after = time - before[0], time - after[0]
-    variance = before[5] + before[6] * since_before * since_before
-    after_variance = after[5] + after[6] * since_after * since_after
-    weight = after_variance / (variance + after_variance)
-    x = weight * (before[1] + before[3] * since_before) + (1.0 - weight) * (
-        after[1] + after[3] * since_after
-    )
-    y = weight * (before[2] + before[4] * since_before) + (1.0 - weight) * (
-        after[2] + after[4] * since_after
-    )
-    return x, y, weight * variance
-
-
 def _velocity_errors(jump: VelocityJump) -> tuple[float, float]:
     """Errors of a component of the velocities before and after, [m/s]."""
     return math.sqrt(jump.lines[0, 6]), math.sqrt(jump.lines[1, 6])
-
-
-@compiled
-def _are_straight(lines: NDArray[np.float64]) -> bool:
-    for k in range(2):
-        freedom = 2.0 * lines[k, 8] - 4.0
-        if lines[k, 7] > freedom + _MAX_CHI_SQUARE_SIGMAS * math.sqrt(2.0 * freedom):
-            return False
-    return True

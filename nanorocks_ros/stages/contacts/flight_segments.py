@@ -45,6 +45,8 @@ class VelocityJump(NamedTuple):
         Times of the last frame before the jump and of the first after it.
     shared_error : float, [m]
         Error of a coordinate that all positions share; their residuals do not show it.
+    origin : float, [s]
+        Time at which the slopes of the lines are velocities, where beads accelerate.
     """
 
     track: int
@@ -55,6 +57,24 @@ class VelocityJump(NamedTuple):
     last: float
     first: float
     shared_error: float
+    origin: float
+
+    def at(self, origin: float, acceleration: NDArray[np.float64]) -> VelocityJump:
+        """The jump with lines whose slopes are velocities at another time.
+
+        Parameters
+        ----------
+        origin : float, [s]
+        acceleration : ndarray (2,), [m/s^2]
+            Of the beads between contacts.
+        """
+        if not acceleration.any():
+            return self
+        later, lines = origin - self.origin, self.lines.copy()
+        middles = lines[:, :1] - 0.5 * (origin + self.origin)
+        lines[:, 1:3] += later * middles * acceleration
+        lines[:, 3:5] += later * acceleration
+        return self._replace(lines=lines, origin=origin)
 
     @property
     def before(self) -> Line:
@@ -90,6 +110,8 @@ class FlightSegments:
     Parameters
     ----------
     tray : Tray
+    acceleration : tuple of 2 floats, optional, [m/s^2]
+        Of all beads between contacts, along columns and rows.
 
     Attributes
     ----------
@@ -97,7 +119,7 @@ class FlightSegments:
         Of beads of the first species: lines are fitted in the clock of a gas with that.
     """
 
-    def __init__(self, tray: Tray) -> None:
+    def __init__(self, tray: Tray, acceleration: tuple[float, float] = (0.0, 0.0)) -> None:
         species = tray.species
         # When angular grains collide, the change of velocity does not follow the line of centres.
         self._is_round = np.array([kind.properties.shape != 'grain' for kind in species])
@@ -110,6 +132,7 @@ class FlightSegments:
         self._slots: dict[int, int] = {}
         self._free = list(range(_INITIAL_SLOTS))[::-1]
         self._buffer = TrackBuffer.empty(_INITIAL_SLOTS)
+        self._buffer.acceleration[:] = acceleration
         # Species, radius and measurement error of the radius of each slot.
         self._species = np.zeros(_INITIAL_SLOTS, dtype=np.int32)
         self._sizes = np.zeros((_INITIAL_SLOTS, 2))
@@ -237,7 +260,11 @@ class FlightSegments:
             numbers[: 2 * LINE_SIZE].reshape(2, LINE_SIZE),
             numbers[2 * LINE_SIZE :].tolist(),
         )
-        return VelocityJump(track, species, radius, error, lines, *times_and_error)
+        last, first, shared_error = times_and_error
+        origin = 0.5 * (last + first)
+        return VelocityJump(
+            track, species, radius, error, lines, last, first, shared_error, origin
+        )
 
     def _add_flight(self, track: int, bend: NDArray[np.float64]) -> None:
         species = int(self._species[self._slots[track]])

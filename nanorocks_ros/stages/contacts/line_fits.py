@@ -12,6 +12,8 @@ from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.tracking.linking.free_flight import fit_line as _fit
 
 _N_SUMS = 8
+# Largest excess of chi square of a flight, in standard deviations: noise exceeds it once in 1000.
+_MAX_CHI_SQUARE_SIGMAS = 4.0
 LINE_SIZE = 10
 """Length of the array that holds a `Line`, in the order of its fields."""
 
@@ -219,3 +221,30 @@ def intersect_lines(lines: NDArray[np.float64]) -> tuple[float, float, float]:
         time += step
         error, chi_square = 1.0 / math.sqrt(denominator), max(total - numerator * step, 0.0)
     return time, error, chi_square
+
+
+@compiled
+def contact_position(lines: NDArray[np.float64], time: float) -> tuple[float, float, float]:
+    """Position of the bead at the contact from both flights, and the variance of a coordinate."""
+    before, after = lines[0], lines[1]
+    since_before, since_after = time - before[0], time - after[0]
+    variance = before[5] + before[6] * since_before * since_before
+    after_variance = after[5] + after[6] * since_after * since_after
+    weight = after_variance / (variance + after_variance)
+    x = weight * (before[1] + before[3] * since_before) + (1.0 - weight) * (
+        after[1] + after[3] * since_after
+    )
+    y = weight * (before[2] + before[4] * since_before) + (1.0 - weight) * (
+        after[2] + after[4] * since_after
+    )
+    return x, y, weight * variance
+
+
+@compiled
+def are_straight(lines: NDArray[np.float64]) -> bool:
+    """Whether both flights of a contact, (2, LINE_SIZE), are straight within their errors."""
+    for k in range(2):
+        freedom = 2.0 * lines[k, 8] - 4.0
+        if lines[k, 7] > freedom + _MAX_CHI_SQUARE_SIGMAS * math.sqrt(2.0 * freedom):
+            return False
+    return True

@@ -225,10 +225,25 @@ def _break_point(buffer: TrackBuffer, slot: int, first: int, end: int) -> tuple[
     times = buffer.times[slot, first:end]
     return best_break(
         undragged_times(times, times[0], buffer.drags[slot]),
-        buffer.positions[slot, first:end],
+        _fallen_back(buffer, slot, first, end, times[0]),
         buffer.errors[slot, first:end],
         _MIN_SIDE_POINTS,
     )
+
+
+@compiled
+def _fallen_back(
+    buffer: TrackBuffer, slot: int, first: int, end: int, origin: float
+) -> NDArray[np.float64]:
+    """Positions for an observer that falls with the beads, and is at rest at `origin`, [s]."""
+    positions = buffer.positions[slot, first:end].copy()
+    if buffer.acceleration[0] == 0.0 and buffer.acceleration[1] == 0.0:
+        return positions
+    for k in range(end - first):
+        since = buffer.times[slot, first + k] - origin
+        for c in range(2):
+            positions[k, c] -= 0.5 * buffer.acceleration[c] * since * since
+    return positions
 
 
 @compiled
@@ -240,10 +255,10 @@ def _write_line(
     origin: float,
     row: NDArray[np.float64],
 ) -> None:
-    """Fit a line to positions, in the clock of the gas without drag: its slope is at `origin`."""
+    """Fit a line to positions, without drag and acceleration: its slope is at `origin`."""
     write_line(
         undragged_times(buffer.times[slot, first:end], origin, buffer.drags[slot]),
-        buffer.positions[slot, first:end],
+        _fallen_back(buffer, slot, first, end, origin),
         buffer.errors[slot, first:end],
         row,
     )

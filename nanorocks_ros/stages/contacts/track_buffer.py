@@ -41,6 +41,8 @@ class TrackBuffer(NamedTuple):
         `flight_starts`, which keeps up with the last positions.
     drags : ndarray (slots,), >= 0, [1/s]
         Of the beads: their flights are straight in the clock of a gas without drag.
+    acceleration : ndarray (2,), [m/s^2]
+        Of all beads between contacts: their flights are straight for an observer that falls.
     """
 
     times: NDArray[np.float64]
@@ -51,6 +53,7 @@ class TrackBuffer(NamedTuple):
     previous_starts: NDArray[np.int64]
     free_starts: NDArray[np.int64]
     drags: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
 
     @classmethod
     def empty(cls, slots: int) -> TrackBuffer:
@@ -64,11 +67,13 @@ class TrackBuffer(NamedTuple):
             previous_starts=np.zeros(slots, dtype=np.int64),
             free_starts=np.zeros(slots, dtype=np.int64),
             drags=np.zeros(slots),
+            acceleration=np.zeros(2),
         )
 
     def doubled(self) -> TrackBuffer:
         """Return a copy with twice as many slots."""
-        return TrackBuffer(*(np.concatenate([column, np.zeros_like(column)]) for column in self))
+        columns = [np.concatenate([column, np.zeros_like(column)]) for column in self]
+        return TrackBuffer(*columns)._replace(acceleration=self.acceleration)
 
 
 @compiled

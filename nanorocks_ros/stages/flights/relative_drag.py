@@ -5,6 +5,7 @@ Tested by ``test/stages/flights/test_free_flights.py``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,8 +35,14 @@ def relative_drag(tray: Tray, species: int, radius: float) -> float:
     radius : float, [m]
     """
     first = tray.species[0]
-    own = stokes_rate(1.0, tray.species[species].density, 2.0 * radius)
-    return own / stokes_rate(1.0, first.density, first.diameter)
+    own = stokes_rate(1.0, _density(tray, species), 2.0 * radius)
+    return own / stokes_rate(1.0, _density(tray, 0), first.diameter)
+
+
+def _density(tray: Tray, species: int) -> float:
+    """Density of a species, [kg/m^3]; where one is not known all count as alike."""
+    alike = any(math.isnan(kind.density) for kind in tray.species)
+    return 1.0 if alike else tray.species[species].density
 
 
 def mean_relative_drag(tray: Tray) -> float:

@@ -83,7 +83,8 @@ class TrayCrop:
         self._nodes = nodes_of(region, view)
         mono = encoding == 'mono8'
         channel_mix = np.ones(1) if mono else np.array(self._mix, dtype=np.float64)
-        wall = settings.preprocess.wall_width * self._scale
+        # In the picture of a microscope the width for trays of the flight would be enormous.
+        wall = min(settings.preprocess.wall_width * self._scale, *region[2:])
         stabilise = settings.preprocess.stabilise
         self._registration = (
             TrayRegistration(region, view, wall, channel_mix) if stabilise else None

@@ -19,14 +19,18 @@ from nanorocks_ros.stages.tracking.linking.track_snapshot import (
     count_seen,
     in_metres,
 )
+from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.materials import Material
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.stages.tracking.camera_motion import TrayMotion
+    from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
 
 _NS = 1e9
 # Visible share of a species below which speeds and counts are unreliable.
@@ -34,12 +38,17 @@ _MIN_VISIBLE_SHARE = 0.85
 # Systematic error of a position in a tray with grains too crowded to track, [px]. It is the same
 # in successive frames and does not affect velocities.
 _CROWDED_PX = 0.6
+# Largest speed of beads of the flight, [m/s]; and largest step of others over the distance of
+# neighbours.
+_FLIGHT_MAX_SPEED = 0.05
+_NEIGHBOUR_SHARE = 0.5
 
 
 class Tracker(RestartingStage[TrayImage, Tracks]):
     """Tracks the beads of one tray.
 
-    An image gives one record of tracks; a gray image none, since colour separates the species.
+    An image gives one record of tracks; a gray image none, since colour separates the species,
+    unless the look of the beads is learnt from the film.
 
     Parameters
     ----------
@@ -53,17 +62,58 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         self._settings = settings.tracking
         self._scale = settings.preprocess.pixels_per_metre
         self._tray = tray
-        self._expected = np.array([species.count for species in tray.species], dtype=np.int32)
+        self._expected = np.array(
+            [species.expected or 0 for species in tray.species], dtype=np.int32
+        )
+        self._lesson: tuple[NDArray[np.uint8], ...] = ()
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         """Forget the tracks and the background: the next image is the first one."""
         del stamp_ns
-        self._detector = BeadDetector(self._settings, self._tray, self._scale)
+        self._detector = self._new_detector()
         self._camera = CameraMotion()
         self._linkers: list[Linker] = []
         self._first_ns: int | None = None
         self._next_id = 0
+        self._own_max_speed = _FLIGHT_MAX_SPEED
+        self._last_time = math.nan
+
+    def learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        """Learn the look of the beads from frames of the whole film, where it is not known.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+            Of the tray, spread over the film; without them the look is learnt on the way.
+        """
+        self._lesson = tuple(frames)
+        self._detector = self._new_detector()
+
+    def _new_detector(self) -> BeadDetector | SceneDetector:
+        if not self._tray.is_learnt:
+            return BeadDetector(self._settings, self._tray, self._scale)
+        detector = SceneDetector(self._tray, self._scale)
+        if self._lesson:
+            detector.learn(self._lesson)
+        return detector
+
+    @property
+    def max_speed(self) -> float:
+        """Largest speed at which beads are linked, [m/s]."""
+        return self._settings.max_speed or self._own_max_speed
+
+    def _update_max_speed(self, time: float, detected: Sequence[Detections]) -> None:
+        """Of beads that are learnt: half of the distance of neighbours between two frames."""
+        count = sum(detections.radii.size for detections in detected)
+        interval, self._last_time = time - self._last_time, time
+        if not self._tray.is_learnt or count == 0 or not interval > 0.0:
+            return
+        spacing = math.sqrt(math.prod(self._tray.dimensions[:2]) / count)
+        reach = max(_NEIGHBOUR_SHARE * spacing, self._tray.species[0].diameter_low)
+        self._own_max_speed = reach / interval
+        for linker in self._linkers:
+            linker.max_speed = self.max_speed * self._scale
 
     @property
     def darkness(self) -> NDArray[np.uint8] | None:
@@ -82,7 +132,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
 
     def _process(self, record: TrayImage) -> tuple[Tracks, ...]:
         """Detect and link the beads of an image."""
-        if record.color is None:
+        color = self.color_of(record)
+        if color is None:
             self.watch(record)
             return ()
         time = self._time(record)
@@ -95,7 +146,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         rest = self._camera.camera_moves or math.isnan(record.displacement[0])
         expected = np.zeros(2) if rest else self._scale * np.array(record.displacement)
         hints = [linker.hints(time, expected) for linker in self._linkers]
-        detected = self._detector.detect(record.color, hints)
+        detected = self._detector.detect(color, hints)
         motion = self._motion(
             record,
             np.concatenate([detections.positions for detections in detected]),
@@ -105,6 +156,7 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             self._linkers = [
                 self._linker_of(species, record.gray.shape) for species in self._tray.species
             ]
+        self._update_max_speed(time, detected)
         shift = motion.displacement
         for linker, detections in zip(self._linkers, detected, strict=True):
             errors = np.hypot(detections.position_errors, registration)
@@ -113,6 +165,12 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             )
             self._next_id += linker.push(time, shifted, shift, self._next_id)
         return (self._tracks(record, time, motion),)
+
+    def color_of(self, image: TrayImage) -> NDArray[np.uint8] | None:
+        """The colours of an image; those of a gray one where beads are learnt, None otherwise."""
+        if image.color is None and self._tray.is_learnt:
+            return np.repeat(image.gray[:, :, None], 3, axis=2)
+        return image.color
 
     def watch(self, image: TrayImage) -> None:
         """Follow the motion of the picture alone, where beads are not tracked."""
@@ -135,10 +193,10 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         return self._camera.push(self._time(image), places, radii, moved, error)
 
     def _linker_of(self, species: Species, shape: tuple[int, ...]) -> Linker:
-        return Linker(
+        linker = Linker(
             species.count,
             (float(shape[1]), float(shape[0])),
-            self._settings.max_speed * self._scale,
+            self.max_speed * self._scale,
             self._settings.memory,
             self._settings.window,
             FlightDeviations(
@@ -147,6 +205,8 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
                 hidden=self._tray.chalk,
             ),
         )
+        linker.follows_struck_beads = self._tray.is_learnt
+        return linker
 
     def _systematic_error(self, material: Material) -> float:
         if self._tray.chalk:

@@ -129,13 +129,17 @@ class PreprocessedFrames:
             'straight'
         ]
 
-    def shots(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Shot]:
+    def shots(
+        self, progress: Callable[[int, int], None] | None = None, *, every: int = 1
+    ) -> Iterator[Shot]:
         """Every frame that can be decoded, in order; once.
 
         Parameters
         ----------
         progress : callable, optional
             Called with the frames done and the frames there are.
+        every : int, optional
+            1: each frame; 2: every other one, and so on.
 
         Raises
         ------
@@ -145,7 +149,8 @@ class PreprocessedFrames:
         any_images = False
         for number, frame in enumerate(self._bag.frames()):
             self.frames = number + 1
-            self._take(number, frame)
+            if number % every == 0:
+                self._take(number, frame)
             for shot in self._complete(self._stage.held_from_ns):
                 any_images = any_images or bool(shot.images)
                 yield shot
@@ -252,8 +257,10 @@ class BagImages:
             *self._frames.lens_notices,
         ]
 
-    def shots(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Shot]:
+    def shots(
+        self, progress: Callable[[int, int], None] | None = None, *, every: int = 1
+    ) -> Iterator[Shot]:
         """Every frame that can be decoded; see `PreprocessedFrames.shots`."""
-        for shot in self._frames.shots(progress):
+        for shot in self._frames.shots(progress, every=every):
             self._notices += [record.text for record in shot.records if isinstance(record, Notice)]
             yield shot

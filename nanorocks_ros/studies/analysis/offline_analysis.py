@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,11 +25,12 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PriorSettings
 from nanorocks_ros.studies.analysis.bag_images import PreprocessedFrames, open_camera
+from nanorocks_ros.studies.analysis.recognition_verdicts import recognition_verdicts
+from nanorocks_ros.studies.analysis.scene_frames import scene_frames
 from nanorocks_ros.wire.products import MEASURED, is_measured
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
-    from pathlib import Path
 
     from nanorocks_ros.errors import FrameError
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.pipeline.composition import Result
     from nanorocks_ros.records import ArrayRecord, RecordType
     from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.analysis.recognition_verdicts import Verdict
 
 
 # A gap of more than this many usual intervals means that frames are missing.
@@ -61,6 +64,8 @@ class TrayResults:
         What the cycles say of the restitutions, so that cycles of other recordings can be added.
     sticking : tuple of StickingCycle
         What they say of the sticking speed.
+    verdicts : tuple of Verdict
+        How well each species was recognised; empty where beads were not tracked.
     """
 
     def __init__(
@@ -76,6 +81,7 @@ class TrayResults:
         self.truth = truth or []
         self.evidence: CycleLikelihoods | None = None
         self.sticking: tuple[StickingCycle, ...] = ()
+        self.verdicts: tuple[Verdict, ...] = ()
         for record in records:
             self.add(record)
 
@@ -163,6 +169,13 @@ class Analysis:
     prior: PriorSettings = field(default_factory=PriorSettings)
 
     @property
+    def usable(self) -> bool:
+        """Whether the beads of all trays were recognised well enough to use the result."""
+        return all(
+            verdict.usable for results in self.trays.values() for verdict in results.verdicts
+        )
+
+    @property
     def frames(self) -> int:
         """Frames analysed."""
         return len(self.stamps_ns)
@@ -226,6 +239,9 @@ def analyse(
     """
     bag, epoch_ns, view = open_camera(path, settings, image_topic)
     pipeline = Pipeline(settings, bag.where, view)
+    lessons = scene_frames(Path(path), settings, image_topic=image_topic, progress=progress)
+    for number, lesson in lessons.items():
+        pipeline.trays[number].measurement.learn(lesson)
     truth = bag.truth(epoch_ns)
     result = Analysis(
         epoch_ns=epoch_ns,
@@ -257,6 +273,8 @@ def analyse(
     for number, stages in pipeline.trays.items():
         result.trays[number].evidence = stages.restitution.evidence
         result.trays[number].sticking = stages.clusters.cycles
+        counts = stages.measurement.recognition.counts()
+        result.trays[number].verdicts = recognition_verdicts(counts)
     # Known only after reading: where a damaged bag ends.
     result.notices[:0] = [*bag.reader.notices, *bag.notices]
     result.complete = result.complete and bag.reader.complete

@@ -17,6 +17,7 @@ from nanorocks_ros.studies.analysis.cycle_words import (
     used_speeds,
     wall_prior,
 )
+from nanorocks_ros.studies.analysis.recognition_verdicts import verdict_as_json
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.flat_records import flat_value
 
@@ -146,6 +147,7 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
             for estimate in cycles
         ),
         'reason': None if reason is None else reason._asdict(),
+        'recognition': [verdict_as_json(verdict) for verdict in results.verdicts],
         'truth': _truth_as_json(analysis, results, series=series),
     }
 

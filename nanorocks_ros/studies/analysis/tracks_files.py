@@ -46,9 +46,29 @@ COLUMNS = (
 """Columns of the table, a row for each bead in each frame: positions from the corner of the
 tray floor, velocities past the camera, `seen` 0 where the bead is hidden and predicted."""
 
+_LENGTHS = 'x', 'y', 'position_error', 'vx', 'vy', 'velocity_error', 'radius', 'radius_error'
+_PX_COLUMNS = tuple(
+    Column(name=f'{column.name}_px', kind='f8', unit=(column.unit or 'm').replace('m', 'px', 1))
+    for column in COLUMNS
+    if column.name in _LENGTHS
+)
+
 # Digits of a number in CSV: nanometres of a tray, and less than any error.
 _DIGITS = 7
 _NS = 1e9
+
+
+def columns_of(tracked: TrackedBag) -> tuple[Column, ...]:
+    """Columns of the table of a recording.
+
+    Where its trays file was made for the film, lengths and speeds stand there in px of the frame,
+    too; and in px alone where the scale is not known.
+    """
+    if tracked.film is None:
+        return COLUMNS
+    if tracked.film.scale_known:
+        return (*COLUMNS, *_PX_COLUMNS)
+    return (*(column for column in COLUMNS if column.name not in _LENGTHS), *_PX_COLUMNS)
 
 
 def write_tracks(path: Path, tracked: TrackedBag) -> None:
@@ -68,17 +88,18 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     RecordingError
         When the file cannot be written.
     """
+    columns = columns_of(tracked)
     if path.suffix == '.parquet':
-        write_parquet(path, COLUMNS, _pieces(tracked), _provenance(tracked))
+        write_parquet(path, columns, _pieces(tracked), _provenance(tracked))
         return
     with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
-        units = ', '.join(f'{column.name} [{column.unit}]' for column in COLUMNS if column.unit)
+        units = ', '.join(f'{column.name} [{column.unit}]' for column in columns if column.unit)
         stream.write(f'# {units}\n')
         writer = csv.writer(stream, lineterminator='\n')
-        writer.writerow([column.name for column in COLUMNS])
+        writer.writerow([column.name for column in columns])
         for piece in _pieces(tracked):
-            columns = [_as_text(piece[column.name]) for column in COLUMNS]
-            writer.writerows(zip(*columns, strict=True))
+            texts = [_as_text(piece[column.name]) for column in columns]
+            writer.writerows(zip(*texts, strict=True))
 
 
 def _pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
@@ -91,8 +112,10 @@ def _pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
 
 def _rows(tracks: Tracks, frame: int, tracked: TrackedBag) -> dict[str, NDArray[Any]]:
     n = tracks.ids.size
+    scale, region = tracked.pixels_per_metre, tracked.regions.get(tracks.tray)
+    corner = {} if region is None else {'x': region.x, 'y': region.y}
     materials = np.array([species.material for species in tracked.trays[tracks.tray].species])
-    return {
+    rows = {
         'time': np.full(n, (tracks.stamp_ns - tracked.epoch_ns) / _NS),
         'frame': np.full(n, frame, dtype=np.int32),
         'tray': np.full(n, tracks.tray, dtype=np.int32),
@@ -108,6 +131,8 @@ def _rows(tracks: Tracks, frame: int, tracked: TrackedBag) -> dict[str, NDArray[
         'radius_error': tracks.radius_errors,
         'seen': tracks.seen.astype(np.int32),
     }
+    in_px = {f'{name}_px': scale * rows[name] + corner.get(name, 0) for name in _LENGTHS}
+    return rows | in_px
 
 
 def _as_text(values: NDArray[Any]) -> list[str]:

@@ -115,6 +115,7 @@ class TraySummary(TypedDict):
     """One tray in a `BagSummary`; see `results_json` for the keys of a cycle."""
 
     cycles: list[dict[str, Any]]
+    recognition: list[dict[str, Any]]
     truth: dict[str, Any] | None
     by_cycle: dict[str, list[dict[str, Any]]]
 

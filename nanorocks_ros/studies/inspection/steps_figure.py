@@ -117,10 +117,12 @@ def _tracked_counts(steps: TraySteps) -> str:
     tracks = steps.tracks
     if tracks is None:
         return 'none, the camera is gray'
-    return ', '.join(
-        f'{int((tracks.seen & (tracks.species == k)).sum())} of {species.count} {species.material}'
-        for k, species in enumerate(steps.tray.species)
-    )
+    counts = []
+    for k, species in enumerate(steps.tray.species):
+        seen = int((tracks.seen & (tracks.species == k)).sum())
+        of = '' if species.expected is None else f' of {species.expected}'
+        counts.append(f'{seen}{of} {species.material}')
+    return ', '.join(counts)
 
 
 def _mask_title(steps: TraySteps, settings: SpeedSettings) -> str:

@@ -21,6 +21,7 @@ from nanorocks_ros.inference.decay.library_fit import (
 from nanorocks_ros.jobs.resumed_tasks import fill_journal, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.npz_archive import write_archive
+from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.simulation.initial_state import rules_of
 from nanorocks_ros.studies.libraries.library_nodes import (
     LibraryPlan,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 _DECAYS = 'log_speed'
 _NODES_IN_TASK = 4
+_LEAST_BEADS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +100,13 @@ def build_library(
     if 0 < plan.rough_nodes < fewest_rough_nodes():
         raise ConfigurationError(
             '--rough-nodes', f'{plan.rough_nodes}', f'give 0, or {fewest_rough_nodes()} or more'
+        )
+    if plan.tray.count < _LEAST_BEADS:
+        raise ConfigurationError(
+            f'tray {plan.tray.number}',
+            f'has {counted(plan.tray.count, "bead")}; a gas whose decay can be compared has '
+            f'{_LEAST_BEADS} or more',
+            'use contacts alone, which need no library: nanorocks measure FILM',
         )
     # A drag or a law out of range is refused before any work.
     rules_of(*simulated_node(plan, 0))

@@ -17,6 +17,7 @@ from nanorocks_ros.stages.tracking.linking.link_probabilities import (
     link_detections,
 )
 from nanorocks_ros.stages.tracking.linking.motion_prediction import Walls, predict, write_hints
+from nanorocks_ros.stages.tracking.linking.struck_beads import link_struck_beads
 from nanorocks_ros.stages.tracking.linking.track_snapshot import TrackSnapshot, write_snapshot
 from nanorocks_ros.stages.tracking.linking.track_store import (
     CONFIRM_FRAMES,
@@ -50,6 +51,12 @@ class Linker:
     memory, window : float, [s]
     deviations : FlightDeviations
         Of this species, in pixels: it learns the errors of the positions.
+
+    Attributes
+    ----------
+    max_speed : float, [px/s]
+    follows_struck_beads : bool
+        Whether a lone bead keeps its number when it is struck, however slow the others are.
     """
 
     def __init__(
@@ -61,9 +68,10 @@ class Linker:
         window: float,
         deviations: FlightDeviations,
     ) -> None:
+        self.follows_struck_beads = False
         self._deviations = deviations
         self._size = np.array(size)
-        self._max_speed = max_speed
+        self.max_speed = max_speed
         self._settings = LinkSettings(expected, memory, window)
         self._speed = 0.0
         self._started = False
@@ -116,7 +124,9 @@ class Linker:
         )
         velocity_change = max(_COLLISION_FACTOR * self._speed, MIN_VELOCITY_CHANGE_PX_S)
         known_beads = KnownBeads(positions, variances, last_positions, time - last_seen, radii)
-        links = link_detections(known_beads, detected, velocity_change, self._max_speed)
+        links = link_detections(known_beads, detected, velocity_change, self.max_speed)
+        if self.follows_struck_beads:
+            links = link_struck_beads(links, known_beads, detected, self.max_speed)
         self._grow(n_tracks, detections.radii.size)
         self._n_tracks, n_new, self._speed = update_tracks(
             self._tracks,

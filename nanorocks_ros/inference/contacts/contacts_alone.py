@@ -1,0 +1,177 @@
+"""Restitutions from rebounds and collisions alone: no decay, no library, no shaking event."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.inference.contacts.contact_likelihood import (
+    marginal,
+    pair_table,
+    rebound_table,
+)
+from nanorocks_ros.inference.contacts.dragged_contacts import (
+    dragged,
+    loss_beside_contacts,
+    loss_sums,
+)
+from nanorocks_ros.inference.flights.flight_losses import (
+    MIN_FLIGHTS,
+    Slowing,
+    flight_losses,
+    flight_table,
+)
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.records import (
+    UNKNOWN_MEASURED_INTERVAL,
+    FreeFlight,
+    Measured,
+    MeasuredInterval,
+    PairCollision,
+    Rebound,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.settings import PriorSettings
+
+# A single contact determines a restitution to 0.003 at best.
+_GRID = np.linspace(0.0, 1.0, 1001)
+# Largest standard deviation of a restitution that is given: a flat one from 0 to 1 has 0.29.
+_LARGEST_DEVIATION = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestitutionOfContacts:
+    """A restitution from single contacts of one kind.
+
+    Parameters
+    ----------
+    contacts : int
+        Their number.
+    restitution : MeasuredInterval
+        Mean, standard deviation and interval of the posterior for a flat prior from 0 to 1;
+        unknown where the contacts do not determine it.
+    speed : float, [m/s]
+        Median speed along the normal before the contacts; NaN without any.
+    """
+
+    contacts: int
+    restitution: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
+    speed: float = float('nan')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactsAlone:
+    """What the contacts of a recording say.
+
+    Parameters
+    ----------
+    beads, walls : RestitutionOfContacts
+        Between beads, and between beads and side walls.
+    by_wall : dict of int to RestitutionOfContacts
+        Of each side wall with rebounds: 0 to 3, low and high along columns, along rows.
+    drag : Measured, [1/s]
+        Of the gas, which the speeds are corrected for; the prior where few flights were seen.
+    """
+
+    beads: RestitutionOfContacts
+    walls: RestitutionOfContacts
+    by_wall: dict[int, RestitutionOfContacts]
+    drag: Measured
+
+
+def contacts_alone(
+    contacts: Iterable[Rebound | PairCollision],
+    flights: Iterable[FreeFlight],
+    prior: PriorSettings,
+    probability: float = 0.95,
+) -> ContactsAlone:
+    """Restitutions from contacts in any state of motion: cooling, driven, steady.
+
+    Parameters
+    ----------
+    contacts : iterable of Rebound or PairCollision
+    flights : iterable of FreeFlight
+        Between them: they show the drag of the gas.
+    prior : PriorSettings
+        Systematic errors of contacts, and what is known of the drag.
+    probability : float
+        Of the intervals.
+    """
+    losses = flight_losses(flight_table(flights), Measured(prior.drag, prior.drag_error))
+    # With fewer flights the prior alone would speak, which is that of a gas at low pressure.
+    is_measured = losses.flights >= MIN_FLIGHTS
+    drag = max(losses.drag.value if is_measured else prior.drag, 0.0)
+    own = [_complete(dragged(contact, drag)) for contact in contacts]
+    rebounds = [contact for contact in own if isinstance(contact, Rebound)]
+    collisions = [
+        contact
+        for contact in own
+        if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
+    ]
+    slowing = Slowing.by_drag(losses.drag if is_measured else Measured(drag, 0.0))
+    numbers = sorted({rebound.wall for rebound in rebounds})
+
+    def walls(some: Sequence[Rebound]) -> RestitutionOfContacts:
+        speeds = [rebound.incoming.value for rebound in some]
+        table = rebound_table(some, _GRID)
+        return _restitution(table, some, speeds, (slowing, prior.rebound_bias, probability))
+
+    return ContactsAlone(
+        beads=_restitution(
+            pair_table(collisions, _GRID[::10]),
+            collisions,
+            [_approach(pair) for pair in collisions],
+            (slowing, prior.collision_bias, probability),
+        ),
+        walls=walls(rebounds),
+        by_wall={
+            number: walls([rebound for rebound in rebounds if rebound.wall == number])
+            for number in numbers
+        },
+        drag=losses.drag,
+    )
+
+
+def _complete(contact: Rebound | PairCollision) -> Rebound | PairCollision:
+    """The contact; without friction beside it where no speed is known of that time."""
+    return contact if contact.friction_length >= 0.0 else replace(contact, friction_length=0.0)
+
+
+def _approach(pair: PairCollision) -> float:
+    """Speed along the projected line of centres, [m/s]."""
+    normal = pair.separation / np.hypot(*pair.separation)
+    return -float((pair.before[1] - pair.before[0]) @ normal)
+
+
+def _restitution(
+    table: NDArray[np.float64],
+    contacts: Sequence[Rebound | PairCollision],
+    speeds: Sequence[float],
+    conditions: tuple[Slowing, float, float],
+) -> RestitutionOfContacts:
+    """The posterior of contacts of one kind; `conditions` are slowing, bias and probability."""
+    if not contacts:
+        return RestitutionOfContacts(contacts=0)
+    slowing, bias, probability = conditions
+    grid = np.linspace(0.0, 1.0, table.shape[1])
+    likelihood = Likelihood1D(restitution=grid, log_likelihood=marginal(table))
+    best = float(grid[np.argmax(likelihood.log_likelihood)])
+    loss = loss_beside_contacts(loss_sums(contacts), slowing)
+    slowed = likelihood.shifted(best * float(np.expm1(loss.value)))
+    posterior = slowed.convolved(float(np.hypot(bias, best * loss.error))).posterior((0.0, 1.0))
+    half = 0.5 * probability
+    lower, upper = posterior.quantiles(np.array([0.5 - half, 0.5 + half])).tolist()
+    known = posterior.deviation <= _LARGEST_DEVIATION
+    value = MeasuredInterval(posterior.mean, posterior.deviation, lower, upper)
+    return RestitutionOfContacts(
+        contacts=len(contacts),
+        restitution=value if known else UNKNOWN_MEASURED_INTERVAL,
+        speed=float(np.median(speeds)),
+    )

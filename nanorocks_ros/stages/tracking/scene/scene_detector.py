@@ -1,0 +1,222 @@
+"""Detection of beads whose look is learnt from the film: any colour, on any floor."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
+from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, SceneModel, scene_model
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Species, Tray
+
+# Frames kept to learn from, spread over the film; the look is learnt again whenever the number
+# of frames has grown by the factor.
+_KEPT_FRAMES = 25
+_GROWTH = 3
+# Radii beyond the range that is told, as a factor: perspective, blur.
+_RADIUS_TOLERANCE = 1.2
+# The background follows the light by one level in so many frames.
+_FOLLOWING_FRAMES = 5
+# Brightness of a shaded bead over that of its colour in even light.
+_DARKEST, _BRIGHTEST = 0.4, 1.35
+# Systematic error of a position: light and shadow on the outline, [px].
+_LEAST_ERROR_PX = 0.03
+# In a layer, up to this height over the diameter, beads are so many radii apart in the picture.
+_LAYER, _LAYER_APART = 1.25, 1.25
+# Vertices of masks have this resolution, [px].
+_SUBPIXEL_BITS = 4
+
+
+class _Found(NamedTuple):
+    """Discs of one species in a frame: column, row, radius; errors; support; how good they are."""
+
+    discs: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    radius_errors: NDArray[np.float64]
+    support: NDArray[np.float64]
+    score: NDArray[np.float64]
+
+    def chosen(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> _Found:
+        return _Found(*(values[rows] for values in self))
+
+
+class SceneDetector:
+    """Finds the beads of one tray by what the film shows.
+
+    Parameters
+    ----------
+    tray : Tray
+        Species without an appearance are learnt, too.
+    pixels_per_metre : float, [px/m]
+    """
+
+    crowded = False
+    darkness = None
+
+    def __init__(self, tray: Tray, pixels_per_metre: float) -> None:
+        self._tray = tray
+        self._scale = pixels_per_metre
+        self._looks = [_look(tray, species, pixels_per_metre) for species in tray.species]
+        self._models: list[SceneModel] = []
+        self._kept: list[NDArray[np.uint8]] = []
+        self._every = 1
+        self._frames = 0
+        self._learnt_at = 0
+        self._allowed: NDArray[np.bool_] | None = None
+
+    def learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        """Learn the look of the beads from frames of the whole film, ahead of the first.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        """
+        self._models = [scene_model(frames, look) for look in self._looks]
+        # Nothing is to be learnt any more.
+        self._learnt_at = -1
+
+    def detect(
+        self, color: NDArray[np.uint8], hints: Sequence[NDArray[np.float64]] = ()
+    ) -> tuple[Detections, ...]:
+        """Detect the beads of each species, in the order of the species of the tray.
+
+        Parameters
+        ----------
+        color : ndarray of uint8, (rows, columns, 3), bgr
+        hints : sequence of ndarrays (k, 4), [px]
+            For each species the predicted beads: column, row, radius and its error.
+        """
+        color = np.ascontiguousarray(color)
+        self._learn_on(color)
+        found = []
+        for k, model in enumerate(self._models):
+            known = hints[k][:, :3] - [0.5, 0.5, 0.0] if len(hints) else None
+            found.append(self._of_species(k, model, color, known))
+            if self._frames % _FOLLOWING_FRAMES == 0:
+                model.colours.follow(color)
+        self._frames += 1
+        return tuple(_detections(rows) for rows in self._best_of_species(found))
+
+    def _learn_on(self, color: NDArray[np.uint8]) -> None:
+        """Keep frames spread over the film so far, and learn from them again as it grows."""
+        if self._learnt_at < 0:
+            return
+        if self._models and color.shape != self._kept[0].shape:
+            self._kept, self._frames, self._learnt_at, self._every = [], 0, 0, 1
+        if self._frames % self._every == 0:
+            self._kept.append(color.copy())
+            if len(self._kept) == 2 * _KEPT_FRAMES:
+                del self._kept[1::2]
+                self._every *= 2
+        if self._frames >= _GROWTH * self._learnt_at or not self._models:
+            self._models = [scene_model(self._kept, look) for look in self._looks]
+            self._learnt_at = max(self._frames, 1)
+
+    def _of_species(
+        self,
+        k: int,
+        model: SceneModel,
+        color: NDArray[np.uint8],
+        hints: NDArray[np.float64] | None,
+    ) -> _Found:
+        """Discs that look like beads of a species, the best first."""
+        candidates = model.candidates(color, hints)
+        outlines = candidates.outlines
+        distances = self._colour_distances(candidates.colours)
+        # Nearer to the colour that is told than what is around it.
+        nearer = distances[:, k] <= self._colour_distances(candidates.around)[:, k]
+        alike = model.alike(candidates) & nearer & (np.argmin(distances, axis=1) == k)
+        alike &= self._is_allowed(outlines.discs, color.shape)
+        found = _Found(
+            outlines.discs,
+            np.hypot(outlines.errors, _LEAST_ERROR_PX),
+            outlines.radius_errors,
+            outlines.support,
+            outlines.support * np.minimum(outlines.steps, 1.0),
+        ).chosen(alike)
+        return found.chosen(np.argsort(-found.score, kind='stable'))
+
+    def _colour_distances(self, colours: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of each colour to that of each species; 0 where none is told, (n, species)."""
+        distances = np.zeros((len(colours), len(self._looks)))
+        for k, look in enumerate(self._looks):
+            if look.colour is not None:
+                told = np.array(look.colour)
+                shade = np.clip(colours @ told / (told @ told), _DARKEST, _BRIGHTEST)
+                distances[:, k] = np.linalg.norm(colours - shade[:, None] * told, axis=1)
+        return distances
+
+    def _is_allowed(self, discs: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Which centres lie inside, and on no mask."""
+        if self._tray.inside is None and not self._tray.masks:
+            return np.ones(len(discs), dtype=bool)
+        if self._allowed is None or self._allowed.shape != shape[:2]:
+            self._allowed = self._painted(shape)
+        limits = np.array([shape[1], shape[0]]) - 1
+        columns, rows = np.clip(np.rint(discs[:, :2]), 0, limits).astype(np.intp).T
+        return np.asarray(self._allowed[rows, columns])
+
+    def _painted(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        allowed = np.full(shape[:2], int(self._tray.inside is None), dtype=np.uint8)
+        if self._tray.inside is not None:
+            self._fill(allowed, self._tray.inside, 1)
+        for mask in self._tray.masks:
+            self._fill(allowed, mask, 0)
+        return allowed.astype(bool)
+
+    def _fill(
+        self, picture: NDArray[np.uint8], corners: tuple[tuple[float, float], ...], value: int
+    ) -> None:
+        places = (np.array(corners) * self._scale - 0.5) * 2**_SUBPIXEL_BITS
+        cv2.fillPoly(picture, [np.rint(places).astype(np.int32)], value, shift=_SUBPIXEL_BITS)
+
+    def _best_of_species(self, found: list[_Found]) -> list[_Found]:
+        """At most as many discs as told, and each place for the species that fits it best."""
+        best = []
+        for k, rows in enumerate(found):
+            others = [other for j, other in enumerate(found) if j != k]
+            keep = np.ones(len(rows.discs), dtype=bool)
+            for other in others:
+                if len(other.discs) and len(rows.discs):
+                    near, nearest = cKDTree(other.discs[:, :2]).query(rows.discs[:, :2])
+                    better = other.score[nearest] > rows.score
+                    keep &= ~((near < rows.discs[:, 2]) & better)
+            best.append(rows.chosen(keep).chosen(np.arange(min(keep.sum(), self._count(k)))))
+        return best
+
+    def _count(self, k: int) -> int:
+        return self._tray.species[k].count
+
+
+def _look(tray: Tray, species: Species, pixels_per_metre: float) -> BeadLook:
+    appearance = species.appearance
+    low = 0.5 * species.diameter_low * pixels_per_metre / _RADIUS_TOLERANCE
+    high = 0.5 * species.diameter_high * pixels_per_metre * _RADIUS_TOLERANCE
+    return BeadLook(
+        radii=(low, high) if math.isfinite(low) else (math.nan, math.nan),
+        sign=0 if appearance is None else appearance.sign,
+        apart=_LAYER_APART if not tray.dimensions[2] > _LAYER * species.diameter_high else 1.0,
+        colour=species.properties.color if appearance is None else appearance.colour,
+    )
+
+
+def _detections(found: _Found) -> Detections:
+    return Detections(
+        # The centre of the first pixel is at (0.5, 0.5).
+        positions=found.discs[:, :2] + 0.5,
+        position_errors=found.errors.copy(),
+        radii=found.discs[:, 2].copy(),
+        radius_errors=found.radius_errors.copy(),
+        visible_outline=found.support.copy(),
+        visible_share=np.minimum(found.support, 1.0),
+    )

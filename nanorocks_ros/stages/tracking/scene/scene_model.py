@@ -1,0 +1,300 @@
+"""What beads look like in a film: radius, brightness, edges and colours, learnt from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nanorocks_ros.stages.tracking.scene.disc_measures import (
+    apart,
+    join_outlines,
+    marked_shares,
+    reduced,
+    ring_colours,
+)
+from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
+from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
+from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
+from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Smallest share of the outline that votes, and that the edges on the circle cover.
+_LEAST_VOTES, _LEAST_SUPPORT = 0.25, 0.5
+_GOOD_SUPPORT = 0.7
+# A disc moves where this share of it differs from the background.
+_MOVING_SHARE = 0.15
+# Moving discs that tell what beads look like, and their share of all discs.
+_LEAST_MOVING, _LEAST_MOVING_SHARE = 6, 0.1
+# Trust in outlines of the difference from the background, over those of the picture itself.
+_DIFFERENCE_TRUST = 0.7
+# Circles inside and outside a disc, in radii; and how much more contrast the background has where
+# a bead has left.
+_INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
+_LEFT_CONTRAST = 1.5
+# A step is that of a bead above this part of the usual one: those of shadows are softer.
+_LEAST_STEP = 0.35
+# And above so many gray levels, and times the noise.
+_LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
+# Colours and steps of alike discs: distance to a known one over the spread.
+_ALIKE, _ALIKE_MOVING = 3.0, 6.0
+_KNOWN_SHARE = 0.03
+# Beads below this radius are enlarged, [px].
+_LEAST_RADIUS_PX = 4.5
+# Discs of the other brightness count when they are at least this part.
+_OTHER_SIGN_SHARE = 0.4
+_LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
+# Frames in which discs are searched to learn from.
+_LEARNING_FRAMES = 8
+_MOST_SAMPLES = 400
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeadLook:
+    """What is told of the beads of a species.
+
+    Parameters
+    ----------
+    radii : tuple of 2 floats, [px]
+        Smallest and largest; NaN: not known.
+    sign : int
+        1: brighter than the floor, -1: darker, 0: not known.
+    colour : tuple of 3 floats or None, bgr, [gray levels]
+    apart : float
+        Smallest distance of two beads in the picture, in radii.
+    """
+
+    radii: tuple[float, float] = (math.nan, math.nan)
+    sign: int = 0
+    colour: tuple[float, float, float] | None = None
+    apart: float = 1.25
+
+
+class Candidates(NamedTuple):
+    """Discs in a frame: outlines, colours inside and around (n, 3), share of each that moves."""
+
+    outlines: Outlines
+    colours: NDArray[np.float64]
+    around: NDArray[np.float64]
+    moving: NDArray[np.float64]
+
+
+class View(NamedTuple):
+    """A picture in which discs are searched.
+
+    Parameters
+    ----------
+    moves : bool
+        Whether it is the difference from the background.
+    voting : Voting
+    evidence : float
+        Sum over the discs that were learnt from.
+    """
+
+    moves: bool
+    voting: Voting
+    evidence: float
+
+    def of(self, color: NDArray[np.uint8], colours: SceneColours) -> NDArray[np.uint8]:
+        """The picture, (rows, columns)."""
+        return colours.difference(color) if self.moves else colours.picture(color)
+
+
+class SceneModel:
+    """What beads of a species look like in a film.
+
+    Discs are searched in the picture itself and, where the background is known, in its difference
+    from that, which shows what moves on any floor and in any colour.
+
+    Parameters
+    ----------
+    frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        Spread over the film; one is enough where beads stand out.
+    look : BeadLook
+
+    Attributes
+    ----------
+    colours : SceneColours
+    views : list of View
+    sees_motion : bool
+        Whether discs that move told what beads look like.
+    """
+
+    def __init__(self, frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> None:
+        colour = None if look.colour is None else np.array(look.colour)
+        self.scale = 1
+        if look.radii[0] > 0.0:
+            self.scale = max(1, math.ceil(_LEAST_RADIUS_PX / math.sqrt(math.prod(look.radii))))
+        self._look = look
+        self.colours: SceneColours = scene_colours(frames, colour).enlarged(self.scale)
+        self.sees_motion = False
+        self._known: cKDTree | None = None
+        self._scales = np.ones(4)
+        chosen = np.linspace(0, len(frames) - 1, min(_LEARNING_FRAMES, len(frames)))
+        self._learn([frames[round(k)] for k in chosen])
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Smallest and largest radius that is searched, [px]."""
+        voting = self.views[0].voting
+        return voting.smallest / self.scale, voting.largest / self.scale
+
+    def candidates(
+        self, color: NDArray[np.uint8], hints: NDArray[np.float64] | None = None
+    ) -> Candidates:
+        """Discs of the right size with an outline in a frame, alike beads or not.
+
+        Parameters
+        ----------
+        color : ndarray of uint8, (rows, columns, 3), bgr
+        hints : ndarray (k, 3), [px], optional
+            Column, row and radius where beads are expected.
+        """
+        if hints is not None:
+            half = 0.5 * (self.scale - 1.0)
+            hints = hints * self.scale + np.array([half, half, 0.0])
+        color = self._enlarged(color)
+        rows = [self._outlines(color, view, hints) for view in self.views]
+        # In the difference a shadow is part of its bead.
+        trust = [_DIFFERENCE_TRUST if view.moves else 1.0 for view in self.views]
+        outlines = join_outlines(
+            [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
+        )
+        outlines = outlines.chosen(apart(outlines, self._look.apart))
+        if self.colours.knows_background:
+            outlines = outlines.chosen(~self._left(color, outlines.discs))
+        colours = ring_colours(color, outlines.discs, _INSIDE)
+        around = ring_colours(color, outlines.discs, _OUTSIDE)
+        moving = marked_shares(self.colours.moving(color), outlines.discs)
+        return Candidates(reduced(outlines, self.scale), colours, around, moving)
+
+    def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        if self.scale == 1:
+            return color
+        size = color.shape[1] * self.scale, color.shape[0] * self.scale
+        return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+
+    def _left(self, color: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Discs that a bead has left: they show in the background, and less in the frame."""
+        contrasts = [
+            np.linalg.norm(
+                ring_colours(image, discs, _INSIDE) - ring_colours(image, discs, _OUTSIDE), axis=1
+            )
+            for image in (color, self.colours.background)
+        ]
+        return np.asarray(contrasts[1] > _LEFT_CONTRAST * contrasts[0] + _LEAST_COLOUR_SPREAD)
+
+    def alike(self, candidates: Candidates) -> NDArray[np.bool_]:
+        """Which of the discs look like beads."""
+        brighter = (candidates.colours - candidates.around).sum(axis=1)
+        told = self._look.sign * brighter >= 0.0
+        if self._known is None:
+            return np.asarray(told)
+        # Not the nearest: what was taken for a bead by mistake is known, too.
+        nearest = max(1, round(_KNOWN_SHARE * self._known.n))
+        distances = self._known.query(self._features(candidates), k=[nearest])[0][:, 0]
+        rest = candidates.moving < _MOVING_SHARE
+        return np.asarray(told & (distances < np.where(rest, _ALIKE, _ALIKE_MOVING)))
+
+    def _outlines(
+        self, color: NDArray[np.uint8], view: View, hints: NDArray[np.float64] | None = None
+    ) -> Outlines:
+        """Discs that show in a view; their steps over the usual one."""
+        picture = view.of(color, self.colours)
+        starts = centres_of_all_sizes(picture, view.voting, _LEAST_VOTES)[:, :3]
+        if hints is not None and len(hints):
+            starts = np.concatenate([starts, hints])
+        outlines = fit_outlines(picture, starts, view.voting)
+        steps = outlines.steps / view.voting.step
+        good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
+        good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * self.colours.noise)
+        return outlines._replace(steps=steps).chosen(good)
+
+    def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
+        self.views = self._plain_views(chosen)
+        if self.colours.knows_background:
+            self.views.append(self._view(chosen, moves=True, sign=1))
+        if not self._look.radii[0] > 0.0:
+            # What moves tells the size first.
+            radii = max(self.views, key=lambda view: (view.evidence > 0.0, view.moves))
+            low, high = radii.voting.smallest, radii.voting.largest
+            self.views = [
+                view._replace(voting=view.voting._replace(smallest=low, largest=high))
+                for view in self.views
+            ]
+        rows = [self.candidates(frame) for frame in frames]
+        every = Candidates(
+            join_outlines([row.outlines for row in rows]),
+            *(np.concatenate([row[k] for row in rows]) for k in (1, 2, 3)),
+        )
+        good = every.outlines.support >= _GOOD_SUPPORT
+        moving = good & (every.moving >= _MOVING_SHARE)
+        enough = max(_LEAST_MOVING, _LEAST_MOVING_SHARE * good.sum())
+        self.sees_motion = bool(moving.sum() >= enough)
+        self._remember(every, moving if self.sees_motion else good)
+
+    def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
+        """The picture, for bright discs, dark ones, or both where both occur.
+
+        Between dense discs of one brightness are gaps of the other.
+        """
+        signs = (1, -1) if self._look.sign == 0 else (self._look.sign,)
+        views = [self._view(frames, moves=False, sign=sign) for sign in signs]
+        views.sort(key=lambda view: -view.evidence)
+        if not self.colours.knows_background:
+            return views[:1]
+        return [
+            view
+            for view in views
+            if view is views[0] or view.evidence > _OTHER_SIGN_SHARE * views[0].evidence
+        ]
+
+    def _view(self, frames: Sequence[NDArray[np.uint8]], *, moves: bool, sign: int) -> View:
+        """A view of the frames with the size, brightness and edges of the discs in it."""
+        low, high = (self.scale * radius for radius in self._look.radii)
+        noise = self.colours.noise
+        view = View(moves, Voting(low, high, sign, 1.0, noise), 0.0)
+        step = usual_step(view.of(frames[-1], self.colours), noise)
+        voting = view.voting._replace(step=step)
+        if not low > 0.0:
+            voting = search_radii(view.of(frames[len(frames) // 2], self.colours), voting)
+        rows = [self._outlines(frame, view._replace(voting=voting)) for frame in frames]
+        outlines = join_outlines(rows)
+        if len(outlines.steps) == 0:
+            return View(moves, voting, 0.0)
+        usual = float(np.quantile(outlines.steps, 0.75))
+        evidence = float((outlines.support**2 * outlines.steps).sum())
+        return View(moves, voting._replace(step=step * usual), evidence)
+
+    def _remember(self, candidates: Candidates, chosen: NDArray[np.bool_]) -> None:
+        """Keep what the chosen discs look like, each within the spread of all."""
+        features = self._features(candidates)[chosen]
+        if len(features) == 0:
+            return
+        spread = 1.4826 * np.median(np.abs(features - np.median(features, axis=0)), axis=0)
+        self._scales = np.maximum(spread, [_LEAST_COLOUR_SPREAD] * 3 + [_LEAST_RADIUS_SPREAD])
+        every = max(1, len(features) // _MOST_SAMPLES)
+        self._known = cKDTree(features[::every] / self._scales)
+
+    def _features(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Colour and radius, over the spread of each."""
+        radii = np.log(candidates.outlines.discs[:, 2])
+        return np.asarray(np.column_stack([candidates.colours, radii]) / self._scales)
+
+
+def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneModel:
+    """Learn what beads look like from frames of a film; see `SceneModel`."""
+    model = SceneModel(frames, look)
+    if look.radii[0] > 0.0 or model.radii[1] >= _LEAST_RADIUS_PX:
+        return model
+    # The size was found: small beads are seen better enlarged.
+    return SceneModel(frames, replace(look, radii=model.radii))

@@ -1,0 +1,179 @@
+"""From colours to the one value of each pixel that shows the beads best, and its noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# A pixel differs from the background, or from what is around it, by so many times the noise.
+_DIFFERS = 5.0
+_LEAST_LEVELS = 6.0
+BACKGROUND_SHARE = 0.3
+"""A background is known where not more than this share of the pixels differs from it."""
+
+# Smallest share of the pixels that has to move to tell the colours of beads.
+_LEAST_MOVING = 2e-4
+# Noise of a pixel is not below that of rounding.
+_LEAST_NOISE = 0.3
+_BLUR_PX = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneColours:
+    """What the picture is made of without the beads.
+
+    Parameters
+    ----------
+    background : ndarray of uint8, (rows, columns, 3), bgr
+        Median over time.
+    weights : ndarray (3,)
+        Of blue, green and red, in the value that shows the beads.
+    noise : float, [gray levels]
+        Of this value, in a pixel.
+    knows_background : bool
+        Whether few enough pixels move to know what is behind the beads.
+    """
+
+    background: NDArray[np.uint8]
+    weights: NDArray[np.float64]
+    noise: float
+    knows_background: bool = False
+
+    def enlarged(self, scale: int) -> SceneColours:
+        """The same for pictures that are enlarged; the noise is that of their pixels."""
+        if scale == 1:
+            return self
+        size = self.background.shape[1] * scale, self.background.shape[0] * scale
+        background = cv2.resize(self.background, size, interpolation=cv2.INTER_CUBIC)
+        return replace(self, background=np.asarray(background, dtype=np.uint8))
+
+    def picture(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The value that shows the beads best, slightly blurred, (rows, columns)."""
+        return _blurred(cv2.transform(color, self._mixture))
+
+    def difference(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Largest difference of a colour of each pixel from the background, slightly blurred."""
+        blue, green, red = cv2.split(cv2.absdiff(color, self.background))
+        return _blurred(cv2.max(cv2.max(blue, green), red))
+
+    def moving(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """1 where a pixel differs from the background, else 0, (rows, columns)."""
+        limit = max(_DIFFERS * self.noise, _LEAST_LEVELS)
+        return np.asarray(cv2.threshold(self.difference(color), limit, 1, cv2.THRESH_BINARY)[1])
+
+    def follow(self, color: NDArray[np.uint8]) -> None:
+        """Move the background by one level towards a frame, where nothing moves."""
+        if color.shape != self.background.shape:
+            color = np.asarray(
+                cv2.resize(color, self.background.shape[1::-1], interpolation=cv2.INTER_CUBIC)
+            )
+        still = cv2.bitwise_not(cv2.merge([255 * self.moving(color)] * 3))
+        for function, limited in (
+            (cv2.add, cv2.subtract(color, self.background)),
+            (cv2.subtract, cv2.subtract(self.background, color)),
+        ):
+            step = cv2.min(cv2.bitwise_and(limited, still), np.ones_like(color))
+            self.background[...] = function(self.background, step)
+
+    @property
+    def _mixture(self) -> NDArray[np.float32]:
+        """Weights and offset that keep the mixture of colours within 0 to 255."""
+        offset = -255.0 * np.minimum(self.weights, 0.0).sum()
+        return np.append(self.weights, offset).astype(np.float32)[None, :]
+
+
+def _blurred(values: cv2.typing.MatLike) -> NDArray[np.uint8]:
+    return np.asarray(cv2.GaussianBlur(values, (3, 3), _BLUR_PX), dtype=np.uint8)
+
+
+def scene_colours(
+    frames: Sequence[NDArray[np.uint8]], colour: NDArray[np.float64] | None = None
+) -> SceneColours:
+    """Learn background and colours from frames spread over a film.
+
+    Parameters
+    ----------
+    frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+    colour : ndarray (3,), bgr, [gray levels], optional
+        Of the beads, where it is known.
+    """
+    background = _median(frames)
+    noise = np.array([_noise(frames[-1][:, :, k]) for k in range(3)])
+    if colour is None:
+        scatter = _moving_scatter(frames, background, noise)
+        scatter = _contrast_scatter(frames, noise) if scatter is None else scatter
+        weights = np.linalg.eigh(scatter)[1][:, -1]
+    else:
+        floor = np.median(background.reshape(-1, 3), axis=0)
+        weights = (colour - floor) / noise**2
+        if not np.abs(weights).sum() > 0.0:
+            weights = np.ones(3)
+    # Positive where the picture gets brighter.
+    weights = weights / np.abs(weights).sum()
+    weights = weights if weights.sum() >= 0.0 or colour is not None else -weights
+    mixed = frames[-1].astype(np.float32) @ weights.astype(np.float32)
+    colours = SceneColours(background=background, weights=weights, noise=_noise(mixed))
+    share = float(np.mean([colours.moving(frame).mean() for frame in frames]))
+    if len(frames) < 3 or share > BACKGROUND_SHARE:
+        return colours
+    # Codecs smooth what the mask sees of the noise, but not how it changes.
+    still = background.astype(np.float32) @ weights.astype(np.float32)
+    changes = float(np.median(np.abs(mixed - still))) / 0.6745
+    return replace(colours, noise=max(colours.noise, changes), knows_background=True)
+
+
+def _median(frames: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Median of each pixel and colour over the frames, some rows at a time."""
+    background = np.empty_like(frames[0])
+    rows = max(1, 4_000_000 // (len(frames) * frames[0][0].size))
+    for first in range(0, len(background), rows):
+        part = np.stack([frame[first : first + rows] for frame in frames])
+        middle = len(frames) // 2
+        background[first : first + rows] = np.partition(part, middle, axis=0)[middle]
+    return background
+
+
+def _noise(values: NDArray[np.uint8] | NDArray[np.float32]) -> float:
+    """Noise of a pixel, by Immerkaer's mask, which lines and slopes do not show in."""
+    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+    edges = np.abs(cv2.filter2D(values, cv2.CV_32F, mask)[1:-1, 1:-1])
+    return max(float(np.median(edges)) / (6.0 * 0.6745), _LEAST_NOISE)
+
+
+def _moving_scatter(
+    frames: Sequence[NDArray[np.uint8]],
+    background: NDArray[np.uint8],
+    noise: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """Mean product of the colours in which moving pixels differ; None where hardly any moves."""
+    scatter, count, total = np.zeros((3, 3)), 0, 0
+    for frame in frames:
+        difference = (frame.astype(np.float32) - background).reshape(-1, 3)
+        limit = np.maximum(_DIFFERS * noise, _LEAST_LEVELS).astype(np.float32)
+        differs = difference[(np.abs(difference) > limit).any(axis=1)].astype(np.float64)
+        scatter += differs.T @ differs
+        count += len(differs)
+        total += len(difference)
+    return scatter / count if count > _LEAST_MOVING * total else None
+
+
+def _contrast_scatter(
+    frames: Sequence[NDArray[np.uint8]], noise: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same of pixels against their wider surroundings."""
+    frame = frames[-1].astype(np.float32)
+    wide = 2 * math.ceil(0.05 * min(frame.shape[:2])) + 1
+    difference = (frame - cv2.blur(frame, (wide, wide))).reshape(-1, 3).astype(np.float64)
+    differs = difference[(np.abs(difference) > _DIFFERS * noise).any(axis=1)]
+    if len(differs) == 0:
+        return np.eye(3)
+    return np.asarray(differs.T @ differs / len(differs))

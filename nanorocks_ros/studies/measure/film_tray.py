@@ -1,0 +1,202 @@
+"""A trays file from the little that is known of a film: diameters in pixels, sides, counts.
+
+What is not told is guessed, and a notice says what was guessed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.appearance import AUTO
+from nanorocks_ros.experiment.film_section import FilmSection
+
+# A bead of unknown size counts as one of the flight: the constants of the stages suit it.
+_NOMINAL_DIAMETER = 2e-3
+# Largest difference of the scales along both sides, relative.
+_MAX_SKEW = 0.03
+_MM = 1e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmedBeads:
+    """A species of beads, as the user describes it.
+
+    Parameters
+    ----------
+    diameter_px : float, [px]
+    diameter : float or None, [m]
+    count : int or None
+    density : float or None, [g/cm^3]
+    look, colour : str
+        As ``look:`` and ``colour:`` of a trays file.
+    """
+
+    diameter_px: float
+    diameter: float | None = None
+    count: int | None = None
+    density: float | None = None
+    look: str = AUTO
+    colour: str = AUTO
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmedTray:
+    """What the user says of a film.
+
+    Parameters
+    ----------
+    beads : tuple of FilmedBeads
+    corners_px : tuple of (float, float), [px]
+        Column and row of the corners of the container; empty: the whole picture.
+    sides : tuple of 2 floats or None, [m]
+        Inner length and width of the container, along columns and rows.
+    height : float or None, [m]
+        Along the line of sight.
+    """
+
+    beads: tuple[FilmedBeads, ...]
+    corners_px: tuple[tuple[float, float], ...] = ()
+    sides: tuple[float, float] | None = None
+    height: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedTray:
+    """A trays file, and what was guessed for it.
+
+    Parameters
+    ----------
+    text : str
+        YAML, with a section ``film``.
+    notices : tuple of str
+    """
+
+    text: str
+    notices: tuple[str, ...]
+
+
+def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
+    """The trays file of a film.
+
+    Parameters
+    ----------
+    filmed : FilmedTray
+    size : tuple of 2 ints, [px]
+        Width and height of the picture.
+
+    Raises
+    ------
+    ConfigurationError
+        For numbers that do not fit each other or the picture.
+    """
+    if not filmed.beads:
+        raise ConfigurationError('--diameter-px', 'is needed', 'measure a bead in the picture')
+    region = _region(filmed.corners_px, size)
+    scale, scale_notice = _scale(filmed, region)
+    largest = max(beads.diameter or beads.diameter_px / scale for beads in filmed.beads)
+    known = filmed.sides is not None and filmed.height is not None
+    section = FilmSection(
+        pixels_per_metre=scale,
+        region_px=region,
+        scale_known=_is_scale_known(filmed),
+        container_known=known and bool(filmed.corners_px),
+    )
+    sides = (region[2] / scale, region[3] / scale, max(filmed.height or 0.0, largest))
+    if known:
+        assert filmed.sides is not None
+        sides = (*filmed.sides, sides[2])
+    notices = [scale_notice, *_guesses(filmed, largest)]
+    return DescribedTray(
+        text=_text(filmed, section, sides),
+        notices=tuple(notice for notice in notices if notice),
+    )
+
+
+def _guesses(filmed: FilmedTray, largest: float) -> list[str]:
+    """What is assumed beside the scale, a line each."""
+    notices = []
+    if filmed.height is None:
+        notices.append(
+            'the height of the container is not told; one layer of beads is assumed, '
+            f'{_MM * largest:.3g} mm; --height-mm sets it'
+            if _is_scale_known(filmed)
+            else 'the height of the container is not told; one layer of beads is assumed'
+        )
+    if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
+        notices.append(
+            'collisions of different beads need their densities; all are taken as alike; '
+            '--density-g-cm3 sets them'
+        )
+    return notices
+
+
+def _is_scale_known(filmed: FilmedTray) -> bool:
+    by_sides = filmed.sides is not None and bool(filmed.corners_px)
+    return by_sides or any(beads.diameter is not None for beads in filmed.beads)
+
+
+def _region(
+    corners: tuple[tuple[float, float], ...], size: tuple[int, int]
+) -> tuple[int, int, int, int]:
+    """The rectangle of the corners, or the whole picture."""
+    if not corners:
+        return 0, 0, *size
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    column, row, right, bottom = (round(float(value)) for value in (*low, *high))
+    if column < 0 or row < 0 or right > size[0] or bottom > size[1]:
+        raise ConfigurationError(
+            '--corners',
+            f'{column} {row} to {right} {bottom} lie outside the picture of {size[0]}x{size[1]}',
+            'give columns and rows in px of the film',
+        )
+    if right - column < 16 or bottom - row < 16:
+        raise ConfigurationError(
+            '--corners', f'are {right - column}x{bottom - row} px apart', 'give opposite corners'
+        )
+    return column, row, right - column, bottom - row
+
+
+def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float, str]:
+    """Pixels per metre, and a notice where it is guessed or contradicted."""
+    by_beads = [
+        beads.diameter_px / beads.diameter for beads in filmed.beads if beads.diameter is not None
+    ]
+    if filmed.sides is not None and filmed.corners_px:
+        along, across = region[2] / filmed.sides[0], region[3] / filmed.sides[1]
+        if abs(along / across - 1.0) > _MAX_SKEW:
+            raise ConfigurationError(
+                '--sides-mm',
+                f'give {along:.0f} px/m along columns and {across:.0f} px/m along rows',
+                'give the length along columns first, and the corners of the inside',
+            )
+        return math.sqrt(along * across), ''
+    if by_beads:
+        return float(np.mean(by_beads)), ''
+    return filmed.beads[0].diameter_px / _NOMINAL_DIAMETER, (
+        'no length is told: results are in px; --diameter-mm gives them in mm'
+    )
+
+
+def _text(filmed: FilmedTray, section: FilmSection, sides: tuple[float, float, float]) -> str:
+    """The trays file."""
+    materials, species = [], []
+    for number, beads in enumerate(filmed.beads, start=1):
+        name = f'beads_{number}' if len(filmed.beads) > 1 else 'beads'
+        density = 1.0 if beads.density is None else beads.density
+        materials.append(f'  {name}: {{density_g_cm3: {density:g}, color_bgr: [90, 90, 90]}}\n')
+        count = '' if beads.count is None else f', count: {beads.count}'
+        diameter = beads.diameter or beads.diameter_px / section.pixels_per_metre
+        species.append(
+            f'      - {{material: {name}, diameter_mm: {_MM * diameter:.6g}{count}, '
+            f'look: {beads.look}, colour: "{beads.colour}"}}\n'
+        )
+    lengths = ', '.join(f'{_MM * side:.6g}' for side in sides)
+    return (
+        f'# Lengths in mm, places in px of the film.\n{section.text()}'
+        f'materials:\n{"".join(materials)}'
+        f'trays:\n  1:\n    dimensions_mm: [{lengths}]\n    species:\n{"".join(species)}'
+    )

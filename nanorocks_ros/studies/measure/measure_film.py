@@ -1,0 +1,245 @@
+"""From the recording of a film to all that it says: tracks, speeds, contacts, decay, a report.
+
+Every step leaves files in the folder of results. A second run takes what it needs from them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+from nanorocks_ros.errors import NanorocksError, RecordingError
+from nanorocks_ros.experiment.film_section import film_section
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
+from nanorocks_ros.studies.analysis.tracks_files import write_tracks
+from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
+from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
+from nanorocks_ros.studies.measure.measure_report import MeasuredTray, write_measure_report
+from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
+from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
+from nanorocks_ros.studies.measure.track_contacts import track_contacts
+from nanorocks_ros.studies.measure.track_speeds import track_speeds, write_speeds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+    from nanorocks_ros.jobs.progress import Progress
+    from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
+
+MARK = 'measured.json'
+"""File of a folder of results; it marks the folder, and holds the numbers."""
+
+_TRACKS, _TABLE, _PICTURE = 'tracks.npz', 'tracks.csv', 'tracks.png'
+
+
+class Teller(Protocol):
+    """Whoever tells the user how far the work is."""
+
+    def say(self, line: str) -> None:
+        """Tell a result or a reason."""
+
+    def progress(self, label: str) -> AbstractContextManager[Progress]:
+        """Show how far a step is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasurePlan:
+    """What to measure.
+
+    Parameters
+    ----------
+    bag : Path
+        Recording of the film.
+    name : str
+        Of the film, for the report.
+    folder : Path
+        For the results.
+    settings : PipelineSettings
+    image_topic : str
+    workers : Workers
+        For the library of decays.
+    describe : callable
+        The cycles of a tray of an analysis in lines.
+    """
+
+    bag: Path
+    name: str
+    folder: Path
+    settings: PipelineSettings
+    image_topic: str
+    workers: Workers
+    describe: Callable[[Analysis, int], list[str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What was measured.
+
+    Parameters
+    ----------
+    trays : tuple of MeasuredTray
+    usable : bool
+        Whether the beads were recognised well enough.
+    report : Path
+    """
+
+    trays: tuple[MeasuredTray, ...]
+    usable: bool
+    report: Path
+
+
+def check_measure_folder(folder: Path) -> None:
+    """Make the folder of results.
+
+    Raises
+    ------
+    RecordingError
+        When it holds something else, or cannot be made.
+    """
+    if folder.exists() and not (folder / MARK).exists() and any(folder.iterdir()):
+        raise RecordingError(
+            str(folder), 'exists and holds no results of `nanorocks measure`', 'pass another -o'
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            str(folder), f'cannot be written ({error.strerror})', 'pass another -o'
+        ) from error
+    if not (folder / MARK).exists():
+        write_bytes(folder / MARK, b'{}\n')
+
+
+def measure_film(plan: MeasurePlan, teller: Teller) -> Measured:
+    """Measure a film, step by step.
+
+    Raises
+    ------
+    RecordingError
+        When the recording cannot be read, or the results not be written.
+    ConfigurationError
+        When the settings cannot be used.
+    FrameError
+        When no frame can be used.
+    """
+    check_measure_folder(plan.folder)
+    tracked = _tracked(plan, teller)
+    trays = tuple(_measured_tray(plan, tracked, number, teller) for number in tracked.trays)
+    report = plan.folder / 'report.html'
+    values = {str(tray.number): tray.as_json() for tray in trays}
+    content = {'film': plan.name, 'usable': tracked.usable, 'trays': values}
+    write_bytes(plan.folder / MARK, (json.dumps(content, indent=1) + '\n').encode())
+    write_measure_report(report, plan.name, tracked, trays, plan.folder / _PICTURE)
+    return Measured(trays=trays, usable=tracked.usable, report=report)
+
+
+def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
+    """The tracks, by this run or by an earlier one."""
+    key = tracking_key(plan.bag, plan.settings, plan.image_topic)
+    archive = plan.folder / _TRACKS
+    tracked = saved_tracks(archive, plan.settings, key)
+    if tracked is not None and (plan.folder / _PICTURE).exists():
+        teller.say(f'tracks: those of an earlier run, {archive}')
+        return tracked
+    with teller.progress('tracking') as progress:
+        tracked = track_bag(
+            plan.bag, plan.settings, image_topic=plan.image_topic, progress=progress
+        )
+    for notice in tracked.notices:
+        teller.say(notice)
+    write_tracks(plan.folder / _TABLE, tracked)
+    pictures = [
+        overlay(image, tracked.tracks[number], tracked.pixels_per_metre, magnification=2)
+        for number, image in sorted(tracked.pictures.items())
+    ]
+    write_overlay(plan.folder / _PICTURE, pictures)
+    save_tracks(archive, tracked, key)
+    return tracked
+
+
+def _measured_tray(
+    plan: MeasurePlan, tracked: TrackedBag, number: int, teller: Teller
+) -> MeasuredTray:
+    """Everything of one tray."""
+    tray, records = tracked.trays[number], tracked.tracks[number]
+    film = film_section(plan.settings.trays_file)
+    height_known = not math.isnan(tray.dimensions[2])
+    known = height_known and (film is None or film.container_known)
+    unit = LengthUnit()
+    if film is not None and not film.scale_known:
+        unit = LengthUnit('px', film.pixels_per_metre)
+    for verdict in tracked.verdicts[number]:
+        for line in verdict.lines():
+            teller.say(line)
+    speeds = track_speeds(records)
+    write_speeds(plan.folder / f'tray_{number}_mean_speeds.csv', speeds)
+    with teller.progress('contacts') as progress:
+        contacts = track_contacts(
+            records, tray, plan.settings, container_known=known, progress=progress
+        )
+    lines = [motion_line(speeds, contacts, unit), *contact_lines(contacts, unit)]
+    for line in lines:
+        teller.say(line)
+    step = DecayStep(
+        tray=tray,
+        records=records,
+        container_known=known,
+        verdicts=tracked.verdicts[number],
+    )
+    decay_lines = _decay_lines(plan, step, teller)
+    for line in decay_lines:
+        teller.say(line)
+    return MeasuredTray(
+        number=number,
+        unit=unit,
+        speeds=speeds,
+        contacts=contacts,
+        recognition=tuple(
+            line for verdict in tracked.verdicts[number] for line in verdict.lines()
+        ),
+        lines=tuple(lines),
+        decay=tuple(decay_lines),
+    )
+
+
+def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str]:
+    """What the decay of the speeds says, or why it is not read."""
+    reason = step.reason_against
+    if reason:
+        return [f'decay: not read; {reason}']
+    number = step.tray.number
+    key = tracking_key(plan.bag, plan.settings, plan.image_topic)
+    note = plan.folder / f'tray_{number}_decay.json'
+    known = _noted(note)
+    if known.get('key') == key:
+        return [str(line) for line in known['lines']]
+    settings = replace(plan.settings, trays=(number,))
+    try:
+        analysis = measured_decay(plan, replace(step, settings=settings), teller)
+    except RecordingError:
+        raise
+    except NanorocksError as error:
+        return [f'decay: not read; {error}']
+    said = {line for verdict in step.verdicts for line in verdict.lines()}
+    lines = [
+        f'decay: {line.strip()}'
+        for line in plan.describe(analysis, number)
+        if line.strip() not in said
+    ]
+    write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())
+    return lines
+
+
+def _noted(note: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(note.read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}

@@ -1,0 +1,144 @@
+"""The beads that some frames of a film show: size where it is not told, number, a picture."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.film_section import film_section
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
+from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, SceneModel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+_REGION, _RINGS = (0, 200, 255), ((80, 255, 120), (255, 160, 60), (200, 120, 255))
+_SHIFT = 4
+# Radii of a bead over which its colour is averaged.
+_INNER = 0.6
+
+
+class SeenBeads(NamedTuple):
+    """Beads of each species in some frames.
+
+    Parameters
+    ----------
+    counts : tuple of float
+        Median over the frames, by species.
+    steady : tuple of float
+        Share of the frames with exactly that number.
+    picture : ndarray of uint8, (rows, columns, 3), bgr
+        The middle frame: the tray framed, beads in rings.
+    """
+
+    counts: tuple[float, ...]
+    steady: tuple[float, ...]
+    picture: NDArray[np.uint8]
+
+
+def guessed_diameter(frames: Sequence[NDArray[np.uint8]]) -> float:
+    """Diameter of the discs that the film shows, [px].
+
+    Raises
+    ------
+    ConfigurationError
+        When no discs of one size stand out.
+    """
+    model = SceneModel(frames, BeadLook())
+    radii = []
+    for frame in frames:
+        candidates = model.candidates(np.ascontiguousarray(frame))
+        radii.append(candidates.outlines.discs[model.alike(candidates), 2])
+    found = np.concatenate(radii)
+    if not found.size:
+        raise ConfigurationError(
+            '--diameter-px', 'cannot be guessed: no discs of one size stand out', 'measure a bead'
+        )
+    return 2.0 * float(np.median(found))
+
+
+def colour_at(frame: NDArray[np.uint8], place: tuple[float, float], diameter: float) -> str:
+    """Colour inside a bead, as ``#rrggbb``.
+
+    Parameters
+    ----------
+    frame : ndarray of uint8, (rows, columns, 3), bgr
+    place : tuple of 2 floats, [px]
+        Column and row of its centre.
+    diameter : float, [px]
+
+    Raises
+    ------
+    ConfigurationError
+        When it does not lie in the picture.
+    """
+    height, width = frame.shape[:2]
+    x, y = place
+    if not (0.0 <= x < width and 0.0 <= y < height):
+        raise ConfigurationError(
+            '--bead', f'{x:g} {y:g} lies outside the picture of {width}x{height}', 'correct it'
+        )
+    mask = np.zeros((height, width), dtype=np.uint8)
+    cv2.circle(mask, (round(x), round(y)), max(1, round(0.5 * _INNER * diameter)), 1, -1)
+    blue, green, red = np.median(frame[mask > 0], axis=0).tolist()
+    return f'#{round(red):02x}{round(green):02x}{round(blue):02x}'
+
+
+def seen_beads(text: str, frames: Sequence[NDArray[np.uint8]]) -> SeenBeads:
+    """Search the beads of a trays file in some frames of its film.
+
+    Parameters
+    ----------
+    text : str
+        Of the file, with a section ``film``.
+    frames : sequence of ndarray of uint8, (rows, columns, 3), bgr
+        Spread over the film.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be used.
+    """
+    (tray,) = load_trays(text).values()
+    section = film_section(text)
+    assert section is not None
+    column, row, width, height = section.region_px
+    crops = [
+        np.ascontiguousarray(frame[row : row + height, column : column + width])
+        for frame in frames
+    ]
+    detector = SceneDetector(tray, section.pixels_per_metre)
+    detector.learn(crops)
+    numbers, shown = [], frames[len(frames) // 2].copy()
+    for k, crop in enumerate(crops):
+        detections = detector.detect(crop)
+        numbers.append([beads.radii.size for beads in detections])
+        if k == len(crops) // 2:
+            for species, beads in enumerate(detections):
+                _draw(shown, beads.positions + np.array([column, row]), beads.radii, species)
+    cv2.rectangle(shown, (column, row), (column + width, row + height), _REGION, 2)
+    table = np.array(numbers)
+    counts = np.median(table, axis=0)
+    steady = (table == counts).mean(axis=0)
+    return SeenBeads(tuple(counts.tolist()), tuple(steady.tolist()), shown)
+
+
+def _draw(
+    picture: NDArray[np.uint8],
+    places: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    species: int,
+) -> None:
+    factor = 2**_SHIFT
+    for (x, y), radius in zip(places.tolist(), radii.tolist(), strict=True):
+        if math.isfinite(radius):
+            centre = round(factor * (x - 0.5)), round(factor * (y - 0.5))
+            colour = _RINGS[species % len(_RINGS)]
+            cv2.circle(picture, centre, round(factor * radius), colour, 2, cv2.LINE_AA, _SHIFT)

@@ -1,0 +1,52 @@
+"""What beads look like is learnt from drawn films of every look, by an independent painter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.drawn_scenes import SCENES, DrawnScene, draw
+from benchmarks.recognition import drawn_score
+from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, scene_model
+
+
+@pytest.mark.parametrize('name', SCENES)
+def test_beads_of_any_look_are_found_and_nothing_else(name):
+    score, _, _ = drawn_score(replace(SCENES[name], seed=11), told=True)
+    assert score.right >= 0.97 * score.beads
+    assert score.right >= 0.97 * score.discs
+
+
+@pytest.mark.parametrize('name', ['bright on dark', 'radius 3 px', 'stained floor, rail, holes'])
+def test_the_size_is_found_when_it_is_not_told(name):
+    frames, _ = draw(SCENES[name])
+    low, high = scene_model(frames[::3], BeadLook()).radii
+    assert low < SCENES[name].radii[0] < high
+    assert high / low < 1.7
+
+
+def test_one_frame_is_enough_where_beads_stand_out():
+    frames, truth = draw(SCENES['bright on dark'])
+    model = scene_model(frames[:1], BeadLook(radii=(7.5, 10.5)))
+    candidates = model.candidates(frames[0])
+    assert model.alike(candidates).sum() == len(truth[0])
+
+
+def test_holes_that_never_move_are_candidates_but_not_alike():
+    scene = replace(SCENES['half of them at rest'], colours=((60, 60, 190),), radii=(13.0, 13.0))
+    frames, _ = draw(scene)
+    model = scene_model(frames[::3], BeadLook(radii=(10.0, 21.0)))
+    candidates = model.candidates(frames[0])
+    holes = np.array([[400 * (2 * k + 1) // 6, 300 // 7] for k in range(3)])
+    alike = candidates.outlines.discs[model.alike(candidates)]
+    assert model.sees_motion
+    assert np.hypot(*(alike[:, None, :2] - holes).transpose(2, 0, 1)).min() > 8.0
+
+
+def test_an_empty_film_has_no_disc():
+    frames, _ = draw(DrawnScene(count=0, frames=10))
+    model = scene_model(frames, BeadLook(radii=(8.0, 12.0)))
+    candidates = model.candidates(frames[0])
+    assert model.alike(candidates).sum() == 0

@@ -1,0 +1,85 @@
+"""A trays file from the little that is known of a film."""
+
+from __future__ import annotations
+
+import pytest
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.film_section import film_section
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.studies.measure.film_tray import FilmedBeads, FilmedTray, described_tray
+
+SIZE = 360, 240
+CORNERS = (30.0, 20.0), (330.0, 220.0)
+
+
+def described(filmed):
+    return described_tray(filmed, SIZE)
+
+
+def test_a_diameter_in_pixels_is_enough():
+    tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0),)))
+    (species,) = load_trays(tray.text)[1].species
+    section = film_section(tray.text)
+    assert not species.counted
+    assert species.appearance.sign == 0
+    assert section.region_px == (0, 0, *SIZE)
+    assert not section.scale_known
+    assert not section.container_known
+    assert species.diameter * section.pixels_per_metre == pytest.approx(20.0)
+    words = ' '.join(tray.notices)
+    for part in ('--diameter-mm', 'one layer'):
+        assert part in words
+
+
+def test_look_and_colour_of_each_species_are_told():
+    beads = (
+        FilmedBeads(diameter_px=20.0, look='bright', count=3),
+        FilmedBeads(diameter_px=30.0, colour='#c03020'),
+    )
+    tray = described(FilmedTray(beads=beads))
+    first, second = load_trays(tray.text)[1].species
+    assert (first.appearance.sign, first.expected) == (1, 3)
+    assert second.appearance.colour == (32.0, 48.0, 192.0)
+    assert 'densities' in ' '.join(tray.notices)
+
+
+def test_a_known_container_gives_the_scale_and_nothing_is_guessed():
+    filmed = FilmedTray(
+        beads=(FilmedBeads(diameter_px=20.0, diameter=4e-3, count=8),),
+        corners_px=CORNERS,
+        sides=(0.06, 0.04),
+        height=0.005,
+    )
+    tray = described(filmed)
+    section = film_section(tray.text)
+    loaded = load_trays(tray.text)[1]
+    assert tray.notices == ()
+    assert section.pixels_per_metre == pytest.approx(5000.0)
+    assert section.region_px == (30, 20, 300, 200)
+    assert section.scale_known
+    assert section.container_known
+    assert loaded.dimensions == pytest.approx((0.06, 0.04, 0.005))
+    assert loaded.species[0].diameter == pytest.approx(4e-3)
+
+
+def test_a_diameter_in_millimetres_gives_the_scale():
+    tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0, diameter=4e-3, count=8),)))
+    section = film_section(tray.text)
+    assert section.scale_known
+    assert section.pixels_per_metre == pytest.approx(5000.0)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'problem'),
+    [
+        ({'corners_px': ((0.0, 0.0), (400.0, 200.0))}, 'outside the picture'),
+        ({'corners_px': ((0.0, 0.0), (5.0, 200.0))}, 'px apart'),
+        ({'corners_px': CORNERS, 'sides': (0.04, 0.06)}, 'along columns first'),
+        ({'beads': ()}, 'is needed'),
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused(changes, problem):
+    values = {'beads': (FilmedBeads(diameter_px=20.0, count=8),), **changes}
+    with pytest.raises(ConfigurationError, match=problem):
+        described(FilmedTray(**values))

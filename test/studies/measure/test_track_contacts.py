@@ -1,0 +1,142 @@
+"""Restitutions from contacts alone: in a driven state, under gravity, of a single ball, in 2-D."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bead_paths import PIXEL, RATE, tracks_of
+
+from benchmarks.accelerated_tray import AcceleratedTray
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
+from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
+from nanorocks_ros.simulation.shaken_tray import after_shaking
+from nanorocks_ros.studies.measure.track_contacts import track_contacts
+
+TRAY = load_trays()[1]
+SETTINGS = PipelineSettings()
+NOISE = 0.05 * PIXEL
+
+
+def bouncing(gravity, restitution, seconds, *, along=0.004):
+    """Positions of a ball of 2 mm over a floor at 20 mm, rows downwards, (frames, 1, 2)."""
+    floor, height, speed, x, step = 0.019, 0.008, 0.0, 0.004, 1e-4
+    positions = []
+    for k in range(round(seconds / step)):
+        if k % round(1.0 / (RATE * step)) == 0:
+            positions.append([[x, floor - height]])
+        height -= speed * step + 0.5 * gravity * step**2
+        speed += gravity * step
+        x += along * step
+        if height < 0.0:
+            # Back to the instant of the contact, and on from there.
+            late = -height / speed
+            speed = restitution * (speed - gravity * late)
+            height, speed = speed * late - 0.5 * gravity * late**2, -(speed - gravity * late)
+    return np.array(positions)
+
+
+def test_a_ball_on_a_floor_gives_its_restitution_and_gravity():
+    paths = bouncing(0.1, 0.8, 3.6)
+    result = track_contacts(
+        list(tracks_of(paths, jitter=NOISE)), TRAY, SETTINGS, container_known=False
+    )
+    assert result.acceleration.is_seen
+    assert result.acceleration.value == pytest.approx((0.0, 0.1), abs=0.003)
+    assert result.walls.turns[3] >= 3
+    assert result.walls.places[3] == pytest.approx(0.020, abs=1e-4)
+    assert set(result.alone.by_wall) == {3}
+    floor = result.alone.by_wall[3].restitution
+    assert floor.lower < 0.8 < floor.upper
+    assert floor.upper - floor.lower < 0.05
+    assert not result.collisions
+    assert math.isnan(result.alone.beads.restitution.value)
+
+
+def test_a_slower_clock_changes_gravity_and_not_the_restitution():
+    records = list(tracks_of(bouncing(0.1, 0.8, 3.6), jitter=NOISE))
+    corrected = track_contacts(records, TRAY, SETTINGS, container_known=False)
+    slow = [replace(record, stamp_ns=2 * record.stamp_ns) for record in records]
+    slowed = track_contacts(slow, TRAY, SETTINGS, container_known=False)
+    assert slowed.acceleration.value[1] == pytest.approx(0.025, abs=0.001)
+    assert slowed.alone.walls.restitution.value == pytest.approx(
+        corrected.alone.walls.restitution.value, abs=2e-3
+    )
+
+
+@pytest.fixture(scope='module')
+def falling_gas():
+    """Tracks of a gas that an acceleration drives, with restitutions 0.85 and 0.93."""
+    settings = SimulationSettings(
+        restitution=0.85, wall_restitution=0.93, seed=1, mean_speed=0.010, first_shake=0.0
+    )
+    moments = list(AcceleratedTray(settings, TRAY, 0, (0.004, -0.003, 0.0)).moments(300))
+    positions = np.array([moment.positions[:, :2] for moment in moments])
+    velocities = np.array([moment.velocities[:, :2] for moment in moments])
+    return list(tracks_of(positions, velocities=velocities, jitter=0.02 * PIXEL))
+
+
+@pytest.mark.parametrize('known', [True, False])
+def test_a_gas_that_falls_gives_both_restitutions_whether_the_walls_are_told(falling_gas, known):
+    result = track_contacts(falling_gas, TRAY, SETTINGS, container_known=known)
+    assert result.acceleration.value == pytest.approx((0.004, -0.003), abs=2e-4)
+    beads, walls = result.alone.beads, result.alone.walls
+    assert beads.contacts > 12
+    assert walls.contacts > 20
+    assert beads.restitution.lower < 0.85 < beads.restitution.upper
+    assert walls.restitution.lower < 0.93 < walls.restitution.upper
+    assert walls.restitution.upper - walls.restitution.lower < 0.02
+
+
+def test_a_driven_tray_in_a_steady_state_gives_both_restitutions():
+    settings = SimulationSettings(
+        restitution=0.85, wall_restitution=0.93, seed=3, mean_speed=0.008, first_shake=0.0
+    )
+    motion = WallMotion(amplitude=(6e-4, 4e-4, 0.0), angular_frequency=2.0 * math.pi * 1.3)
+    rules = rules_of(settings, TRAY, 0)
+    beads = after_shaking(settings, rules, resting_beads(settings, TRAY), 0, 0)
+    times = np.arange(900) / RATE
+    run = HardSphereGas(beads, replace(rules, motion=motion)).follow(times[-1], times)
+    shift = np.outer(np.sin(motion.angular_frequency * times), motion.amplitude[:2])
+    result = track_contacts(
+        list(
+            tracks_of(
+                run.positions[:, :, :2],
+                velocities=run.velocities[:, :, :2],
+                displacements=shift,
+                jitter=0.02 * PIXEL,
+            )
+        ),
+        TRAY,
+        SETTINGS,
+    )
+    beads_alone, walls = result.alone.beads, result.alone.walls
+    # Driven: at the end the beads are as fast as the walls, and there are contacts throughout.
+    assert max(contact.stamp_ns for contact in result.contacts) > 0.9e9 * times[-1]
+    assert beads_alone.contacts > 30
+    assert walls.contacts > 30
+    assert beads_alone.restitution.lower < 0.85 < beads_alone.restitution.upper
+    assert walls.restitution.lower < 0.93 < walls.restitution.upper
+
+
+def test_films_without_contacts_give_no_restitution():
+    time = np.arange(60) / RATE
+    straight = np.stack([0.004 + 0.003 * time, 0.004 + 0.001 * time], axis=1)[:, None]
+    for known in (True, False):
+        result = track_contacts(
+            list(tracks_of(straight, jitter=NOISE)), TRAY, SETTINGS, container_known=known
+        )
+        assert result.contacts == ()
+        assert math.isnan(result.alone.walls.restitution.value)
+        assert not result.acceleration.is_seen
+
+
+def test_empty_tracks_are_no_error():
+    result = track_contacts([], TRAY, SETTINGS, container_known=False)
+    assert result.contacts == ()
+    assert result.frames == 0
