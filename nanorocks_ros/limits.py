@@ -193,6 +193,13 @@ TEXT_BYTES = Limit(
     quantity='size of a JSON or CSV file',
 )
 
+PAUSE_SECONDS = Limit(
+    name='pause_seconds',
+    default=30 * 86_400,
+    unit='seconds',
+    quantity='time between two frames of a recording',
+)
+
 LIMITS = (
     CHUNK_BYTES,
     CHUNK_RATIO,
@@ -210,6 +217,7 @@ LIMITS = (
     DIGITS,
     ARRAY_BYTES,
     TEXT_BYTES,
+    PAUSE_SECONDS,
 )
 """Every limit; `docs/reference/limits.md` lists them."""
 
