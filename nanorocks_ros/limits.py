@@ -222,7 +222,7 @@ LIMITS = (
 """Every limit; `docs/reference/limits.md` lists them."""
 
 
-def refuse_unreadable_kinds(path: os.PathLike[str] | str, kind: type[NanorocksError]) -> None:
+def require_regular_file(path: os.PathLike[str] | str, kind: type[NanorocksError]) -> None:
     """Raise for what is no regular file, and for sparse files that are nearly all hole.
 
     A FIFO or a device would be read forever; a sparse file claims a size that is nowhere.

@@ -176,6 +176,7 @@ class McapFile:
             if isinstance(error, TooLargeError):
                 index.refusals.add(str(error))
             index.lost[block.offset] = indexed_count_after(stream, block) or 0
+            index.read[block.offset] = 0
             return []
         if block.indexed_bytes:
             self._compare_with_index(stream, block, len(messages))
@@ -183,6 +184,7 @@ class McapFile:
         orphans = sum(m.channel not in index.catalogue.channels for m in messages)
         if orphans:
             index.lost[block.offset] = orphans
+        index.read[block.offset] = len(messages) - orphans
         return messages
 
     def _compare_with_index(self, stream: BinaryIO, block: Block, count: int) -> None:

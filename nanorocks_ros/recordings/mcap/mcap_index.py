@@ -67,6 +67,8 @@ class McapIndex:
         Number of skipped records of a kind that the format leaves to applications.
     refusals : set of str
         Limits that the file exceeds.
+    read : dict of int to int
+        Number of messages in each block that was read by the index, by its offset.
     scanned : bool
         Whether the file was scanned; otherwise its own index was read.
     """
@@ -87,6 +89,7 @@ class McapIndex:
     unverified: dict[int, int] = field(default_factory=dict)
     unknown_records: int = 0
     refusals: set[str] = field(default_factory=set)
+    read: dict[int, int] = field(default_factory=dict)
     scanned: bool = False
 
     @property
@@ -96,10 +99,17 @@ class McapIndex:
 
     @property
     def miscount(self) -> int:
-        """Messages that the statistics count and a scan did not find; below 0 for too many."""
-        if not self.scanned or self.stated is None:
+        """Messages that the statistics count and that are not there; below 0 for too many.
+
+        Without a scan this is known once all blocks have been read.
+        """
+        if self.stated is None:
             return 0
-        return self.stated - self.total - self.known_losses
+        if self.scanned:
+            return self.stated - self.total - self.known_losses
+        if len(self.read) < len(self.blocks):
+            return 0
+        return self.stated - sum(self.read.values()) - self.known_losses
 
     @property
     def known_losses(self) -> int:

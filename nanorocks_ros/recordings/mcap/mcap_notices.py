@@ -55,4 +55,5 @@ def _miscount(index: McapIndex) -> list[str]:
     unknown = ''
     if index.unknown_records:
         unknown = f'; {index.unknown_records} records of unknown kinds were skipped'
-    return [f'its statistics count {index.stated} messages, {index.total} are there{unknown}']
+    present = (index.stated or 0) - index.known_losses - index.miscount
+    return [f'its statistics count {index.stated} messages, {present} are there{unknown}']

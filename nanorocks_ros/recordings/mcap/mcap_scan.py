@@ -57,6 +57,7 @@ class _Scanner:
         self._descended = False
         # Kinds of records on the top level so far.
         self._chunked = self._unchunked = self._packed = False
+        self._at_end_of_data = False
         self.index = McapIndex(scanned=True)
 
     def run(self) -> None:
@@ -66,7 +67,7 @@ class _Scanner:
             if following is None:
                 break
             position = following
-            if head.opcode in _END_OF_DATA and position == head.end:
+            if self._at_end_of_data:
                 self._end_run()
                 self._settle_damage()
                 self.index.ended = self._has_footer()
@@ -141,6 +142,7 @@ class _Scanner:
     # --- records -----------------------------------------------------------------------------
 
     def _handle_record(self, head: Head) -> None:
+        self._at_end_of_data = head.opcode in _END_OF_DATA
         if head.opcode == Opcode.MESSAGE_INDEX:
             self._end_run()
             if self._damaged is not None:
@@ -175,8 +177,8 @@ class _Scanner:
             self._run = (start, last, last) if last > start else None
             position = last
         self._end_run()
-        self._settle_damage()
-        self._mark_damage(position)
+        if not self._descended:
+            self._mark_damage(position)
         recover_catalogue(self._stream, position, following, self.index.catalogue)
         return following
 
@@ -193,9 +195,13 @@ class _Scanner:
         """Learn from a record behind damage that the file has chunks, compressed or not."""
         head = None if position is None else read_head(self._stream, position, self._size)
         if head is not None and head.opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX):
-            self._chunked = True
             extent = chunk_extent(self._stream, head)
-            self._packed = self._packed or extent is None or extent.compressed
+            if extent is not None:
+                self._packed = self._packed or extent.compressed
+            elif not self._chunked:
+                # Nothing is known of the chunks: they may be compressed.
+                self._packed = True
+            self._chunked = True
 
     def _mark_damage(self, position: int) -> None:
         self._settle_damage()

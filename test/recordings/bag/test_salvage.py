@@ -347,7 +347,8 @@ def test_a_sqlite_file_with_a_log_beside_it_is_read_and_not_touched(
     for bag in (left, left / 'run.db3'):
         reader = open_bag(bag)
         assert len(list(reader.messages())) == 59
-        assert reader.complete
+        # The folder says that there were 60.
+        assert reader.complete == (bag != left)
         del reader
     salvaged(left, tmp_path / 'new')
     assert sorted(os.listdir(left)) == before
