@@ -128,13 +128,13 @@ HOLE_BYTES = Limit(
 )
 SQLITE_STEPS = Limit(
     name='sqlite_steps',
-    default=20_000_000_000,
+    default=5_000_000_000,
     unit='steps',
     quantity='steps of a query of an SQLite recording',
 )
 TYPE_BYTES = Limit(
     name='type_bytes',
-    default=_MIB,
+    default=256 << 10,
     unit='bytes',
     quantity='text of a message definition',
 )
@@ -152,7 +152,7 @@ TYPE_DEPTH = Limit(
 )
 IMAGE_PIXELS = Limit(
     name='image_pixels',
-    default=120_000_000,
+    default=1 << 26,
     unit='pixels',
     quantity='size of an image',
 )
@@ -220,6 +220,24 @@ LIMITS = (
     PAUSE_SECONDS,
 )
 """Every limit; `docs/reference/limits.md` lists them."""
+
+
+_OPENCV_VARIABLE = 'OPENCV_IO_MAX_IMAGE_PIXELS'
+
+
+def bound_opencv() -> None:
+    """Pass the limit of image sizes to OpenCV, unless the user has set its own variable.
+
+    An invalid setting is reported when an image is read, not here.
+    """
+    text = os.environ.get(IMAGE_PIXELS.variable, '')
+    usable = text.isascii() and text.isdigit() and len(text) <= _LONGEST_SHOWN
+    os.environ.setdefault(_OPENCV_VARIABLE, text if usable else str(IMAGE_PIXELS.default))
+
+
+def is_too_large(error: Exception) -> bool:
+    """Whether OpenCV refused an image for its size."""
+    return 'CV_IO_MAX_IMAGE' in str(error)
 
 
 def require_regular_file(path: os.PathLike[str] | str, kind: type[NanorocksError]) -> None:

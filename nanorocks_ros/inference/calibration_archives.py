@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from nanorocks_ros.archive_limits import check_archive
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.limits import require_regular_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -57,7 +59,11 @@ def load_archive(
     """
     remedy = f'make it again with `{command}`'
     source: Any = resources.files(package).joinpath(name) if package else Path(name)
+    if not package:
+        require_regular_file(name, ConfigurationError)
     try:
+        with source.open('rb') as stream:
+            check_archive(stream, name, ConfigurationError)
         with source.open('rb') as stream, np.load(stream, allow_pickle=False) as arrays:
             return parse(arrays)
     except FileNotFoundError as error:

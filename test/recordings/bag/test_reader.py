@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import os
 import shlex
+import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -628,3 +630,35 @@ def test_a_pipe_in_the_place_of_a_file_is_refused_at_once(tmp_path, record, plac
     else:
         with pytest.raises(RecordingError):
             open_bag(path / place)
+
+
+def test_a_view_in_the_place_of_a_table_is_refused(tmp_path):
+    """It may count for ever."""
+    folder = write_with_rosbags(tmp_path / 'run', StoragePlugin.SQLITE3)
+    file = next(folder.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute('ALTER TABLE messages RENAME TO old')
+        database.execute(
+            'CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 '
+            "FROM n) SELECT id, 1 AS topic_id, id AS timestamp, x'00' AS data FROM n"
+        )
+    with pytest.raises(RecordingError, match="holds 'messages' as a view, not as a table"):
+        open_bag(folder)
+
+
+def test_a_query_that_takes_too_long_ends(tmp_path, monkeypatch):
+    folder = write_with_rosbags(tmp_path / 'run', StoragePlugin.SQLITE3)
+    file = next(folder.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute(
+            'INSERT INTO messages(topic_id, timestamp, data) WITH RECURSIVE n(i) AS (SELECT 9 '
+            "UNION ALL SELECT i + 1 FROM n LIMIT 50000) SELECT 1, i, x'00' FROM n"
+        )
+    assert len(list(open_bag(file).messages())) == 50_003
+    monkeypatch.setenv('NANOROCKS_MAX_SQLITE_STEPS', '1')
+    try:
+        bag = open_bag(file)
+    except RecordingError as error:
+        one_line(error)
+    else:
+        assert not bag.complete
