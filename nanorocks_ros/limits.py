@@ -190,7 +190,7 @@ TEXT_BYTES = Limit(
     name='text_bytes',
     default=256 * _MIB,
     unit='bytes',
-    quantity='size of a JSON or CSV file',
+    quantity='size of a JSON file',
 )
 
 PAUSE_SECONDS = Limit(

@@ -5,6 +5,7 @@ Tested by ``test/inference/decay/test_decay_library.py``.
 
 from __future__ import annotations
 
+import struct
 import zipfile
 import zlib
 from importlib import resources
@@ -25,7 +26,19 @@ if TYPE_CHECKING:
 Content = TypeVar('Content')
 
 # Raised by numpy, zipfile and `parse` for files of other content.
-_DAMAGE = (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    EOFError,
+    RuntimeError,
+    ArithmeticError,
+    MemoryError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def load_archive(
