@@ -1,6 +1,7 @@
 """``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named.
 
 ``python -m benchmarks golden [OPTION ...]`` is a check, not a measurement; see its ``--help``.
+``python -m benchmarks fuzz [OPTION ...]`` damages every kind of input; see its ``--help``.
 ``python -m benchmarks structure [COMMIT]`` counts modules and lines.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from benchmarks import golden, structure
+from benchmarks import fuzz, golden, structure
 
 ALL = (
     'offline',
@@ -60,9 +61,11 @@ ALL = (
 
 
 def main() -> int:
-    """Run each benchmark and print its report, or one of the two checks."""
+    """Run each benchmark and print its report, or one of the three checks."""
     if sys.argv[1:2] == ['golden']:
         return golden.main(sys.argv[2:])
+    if sys.argv[1:2] == ['fuzz']:
+        return fuzz.main(sys.argv[2:])
     if sys.argv[1:2] == ['structure']:
         structure.report(*sys.argv[2:3])
         return 0

@@ -1,4 +1,4 @@
-"""The checksum of the index at the end of an MCAP file, which rosbags leaves out.
+"""Checksums of an MCAP file: that of its index, which rosbags leaves out, and that of its data.
 
 Tested by ``test/recordings/mcap/test_mcap_scan.py``.
 """
@@ -13,6 +13,7 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import MAGIC, RECORD
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import BinaryIO
 
 _CHECKSUM = struct.Struct('<I')
 _START = struct.Struct('<Q')
@@ -46,3 +47,24 @@ def add_summary_checksum(path: Path) -> None:
             left -= len(block)
         stream.seek(end)
         stream.write(_CHECKSUM.pack(checksum))
+
+
+def is_data_intact(stream: BinaryIO, data_end: int) -> bool:
+    """Whether the data section has the checksum in the record behind it, if there is one.
+
+    Parameters
+    ----------
+    stream : binary file
+    data_end : int, [bytes]
+        Offset of that record.
+    """
+    stream.seek(data_end + RECORD.size)
+    (stated,) = _CHECKSUM.unpack(stream.read(_CHECKSUM.size))
+    if not stated:
+        return True
+    stream.seek(0)
+    checksum, left = 0, data_end
+    while left > 0 and (block := stream.read(min(left, _BLOCK))):
+        checksum = zlib.crc32(block, checksum)
+        left -= len(block)
+    return checksum == int(stated)

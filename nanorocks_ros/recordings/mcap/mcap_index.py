@@ -67,6 +67,8 @@ class McapIndex:
         Number of skipped records of a kind that the format leaves to applications.
     refusals : set of str
         Limits that the file exceeds.
+    wrong_checksum : bool
+        Whether the data outside chunks differ from their checksum.
     read : dict of int to int
         Number of messages in each block that was read by the index, by its offset.
     scanned : bool
@@ -91,6 +93,7 @@ class McapIndex:
     refusals: set[str] = field(default_factory=set)
     read: dict[int, int] = field(default_factory=dict)
     scanned: bool = False
+    wrong_checksum: bool = False
 
     @property
     def total(self) -> int:
@@ -127,6 +130,7 @@ class McapIndex:
             or self.unverified
             or self.catalogue.contradictions
             or self.refusals
+            or self.wrong_checksum
             or self.miscount
             or (self.unknown_records and self.stated is None)
         )

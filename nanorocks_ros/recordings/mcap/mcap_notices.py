@@ -34,6 +34,8 @@ def damage_notices(index: McapIndex) -> list[str]:
         notices.append(
             f'{len(index.catalogue.contradictions)} topics or types are stated twice, differently'
         )
+    if index.wrong_checksum:
+        notices.append('its data differ from their checksum; single messages may be wrong')
     return [*notices, *_miscount(index)]
 
 

@@ -20,6 +20,7 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import (
     load,
     recover_catalogue,
 )
+from nanorocks_ros.recordings.mcap.mcap_checksum import is_data_intact
 from nanorocks_ros.recordings.mcap.mcap_chunks import DamagedError, TooLargeError
 from nanorocks_ros.recordings.mcap.mcap_heads import (
     FIRST_PRIVATE,
@@ -143,6 +144,8 @@ class _Scanner:
 
     def _handle_record(self, head: Head) -> None:
         self._at_end_of_data = head.opcode in _END_OF_DATA
+        if head.opcode == Opcode.DATA_END and self._unchunked:
+            self.index.wrong_checksum = not is_data_intact(self._stream, head.start)
         if head.opcode == Opcode.MESSAGE_INDEX:
             self._end_run()
             if self._damaged is not None:
