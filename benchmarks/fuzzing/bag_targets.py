@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.fuzzing.bag_layouts import LAYOUTS, SQLITE, write_bag
 from benchmarks.fuzzing.mutations import damaged, generator_of
-from benchmarks.fuzzing.outcomes import CLEAN_ERROR, SAME, SILENT, TOLD, Outcome
+from benchmarks.fuzzing.outcomes import CLEAN_ERROR, NO_CHECKSUM, SAME, SILENT, TOLD, Outcome
 from benchmarks.fuzzing.recoverable import found_by_library, found_record_by_record
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.recordings.bag.reader import open_bag
@@ -51,8 +51,9 @@ class Bags:
             return Outcome(CLEAN_ERROR, group, damage, str(error))
         if told:
             return Outcome(TOLD, group, damage)
+        difference = SILENT if layout.checksums else NO_CHECKSUM
         same = messages == self._intact[layout]
-        return Outcome(SAME if same else SILENT, group, f'{layout.name}: {damage}')
+        return Outcome(SAME if same else difference, group, f'{layout.name}: {damage}')
 
 
 class Salvage:
@@ -101,7 +102,7 @@ class Salvage:
         )
         wrong = set(recovered) != intact or len(recovered) != len(intact)
         if outcome.name == SAME and wrong:
-            return outcome._replace(name=SILENT)
+            return outcome._replace(name=SILENT if layout.checksums else NO_CHECKSUM)
         return outcome
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.fuzzing.mutations import damaged, generator_of
-from benchmarks.fuzzing.outcomes import CLEAN_ERROR, SAME, SILENT, TOLD, Outcome
+from benchmarks.fuzzing.outcomes import CLEAN_ERROR, NO_CHECKSUM, SAME, SILENT, TOLD, Outcome
 from nanorocks_ros import inference
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.calibration_file import load_calibration
@@ -60,7 +60,7 @@ class Films:
             return Outcome(CLEAN_ERROR, name, damage, str(error))
         if told:
             return Outcome(TOLD, name, damage)
-        return Outcome(SAME if frames == self._frames[name] else SILENT, name, damage)
+        return Outcome(SAME if frames == self._frames[name] else NO_CHECKSUM, name, damage)
 
 
 def _write_film(path: Path, name: str) -> Path:
@@ -125,7 +125,7 @@ class Texts:
         except (NanorocksError, UnicodeDecodeError) as error:
             return Outcome(CLEAN_ERROR, name, damage, str(error))
         self._path.write_text(text)
-        return Outcome(SAME if result == repr(read(self._path)) else SILENT, name, damage)
+        return Outcome(SAME if result == repr(read(self._path)) else NO_CHECKSUM, name, damage)
 
 
 def _load(path: Path) -> object:
@@ -177,7 +177,9 @@ class Results:
         name, read = self._readers[number % len(self._readers)]
         random = generator_of(self.kind, number)
         path, whole = self._folder / name, self._contents[name]
-        if name.endswith('.npz') and random.integers(2):
+        checked = name.endswith('.npz')
+        if checked and random.integers(2):
+            checked = False
             damage = _exchange_array(path, random)
         else:
             content, damage = damaged(whole, random)
@@ -188,7 +190,9 @@ class Results:
             return Outcome(CLEAN_ERROR, name, damage, str(error))
         finally:
             path.write_bytes(whole)
-        return Outcome(SAME if result == repr(read(path)) else SILENT, name, damage)
+        if result == repr(read(path)):
+            return Outcome(SAME, name, damage)
+        return Outcome(SILENT if checked else NO_CHECKSUM, name, damage)
 
 
 def _write_sweep(path: Path) -> None:

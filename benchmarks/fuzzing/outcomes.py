@@ -10,13 +10,15 @@ TOLD = 'told'
 """A result, and a word about the damage."""
 CLEAN_ERROR = 'clean error'
 """One line that names the file and a remedy."""
+NO_CHECKSUM = 'cannot be noticed'
+"""Another result, and no word about it: the input has no checksum, or one that is right."""
 SILENT = 'silent difference'
-"""Another result, and no word about it."""
+"""Another result, and no word about it, although the input has a checksum."""
 TRACEBACK = 'traceback'
 HANG = 'hang'
 MEMORY = 'memory'
 
-CLASSES = (SAME, TOLD, CLEAN_ERROR, SILENT, TRACEBACK, HANG, MEMORY)
+CLASSES = (SAME, TOLD, CLEAN_ERROR, NO_CHECKSUM, SILENT, TRACEBACK, HANG, MEMORY)
 BAD = (SILENT, TRACEBACK, HANG, MEMORY)
 
 
