@@ -30,7 +30,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     'zstd': {'compression': CompressionType.ZSTD},
     'lz4': {'compression': CompressionType.LZ4},
     'no compression': {'compression': CompressionType.NONE},
-    'no chunks': {'use_chunking': False},
+    'no chunks': {'use_chunking': False, 'enable_data_crcs': True},
     'no index': {'compression': CompressionType.ZSTD, 'index_types': IndexType.NONE},
     'no checksums': {'compression': CompressionType.NONE, 'enable_crcs': False},
 }
