@@ -150,9 +150,12 @@ class YamlLines:
         if not isinstance(node, yaml.ScalarNode):
             raise self.error(node, 'expected a single value', 'correct this line')
         try:
-            return yaml.safe_load(node.value) if node.style is None else node.value
+            value = yaml.safe_load(node.value) if node.style is None else node.value
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             raise self.error(node, f'{node.value[:40]!r} cannot be read', 'correct it') from error
+        if isinstance(value, dict | list | set):
+            raise self.error(node, 'expected a single value', 'correct this line')
+        return value
 
     def number(self, node: yaml.Node, what: str = 'finite number') -> float:
         """A number that is finite."""

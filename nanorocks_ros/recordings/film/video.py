@@ -82,6 +82,10 @@ class Video:
         # Opened again because the selection may have read packets.
         with self._opened(path) as container:
             stream = container.streams.video[self._stream_index]
+            if stream.codec_context is None:
+                raise RecordingError(
+                    str(path), 'is in a format that cannot be decoded', 'pass another video'
+                )
             declared = None if rate else declared_rate(path, container, stream)
             self._rate = rate or declared
             self.info = self._film_info(path, container, stream)
