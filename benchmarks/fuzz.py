@@ -84,8 +84,9 @@ def _extend(outcomes: Outcomes, kind: str, number: int, journal: str | None) -> 
     outcome = _Worker.of(kind).ask(number)
     outcomes[kind, number] = outcome
     if journal:
+        # The line break comes first: a last line that was cut short stays a line of its own.
         with Path(journal).open('a', encoding='utf-8') as stream:
-            stream.write(f'{json.dumps([kind, number, *outcome])}\n')
+            stream.write(f'\n{json.dumps([kind, number, *outcome])}')
     if sys.stderr.isatty():
         print(f'\r{kind} {number} ', end='', file=sys.stderr, flush=True)
 

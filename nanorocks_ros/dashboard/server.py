@@ -236,7 +236,11 @@ class PageServer:
             compress=False,
             timeout=_FAREWELL_S,
         )
-        await connection.prepare(request)
+        try:
+            await connection.prepare(request)
+        except ValueError:
+            # aiohttp expects plain ASCII in the heads of the handshake.
+            return web.Response(status=400, text='no handshake\n')
         pause_s = 1.0 / self._settings.picture_rate
         client = Client(connection, self._board, self._pictures, pause_s)
         self._clients.add(client)
