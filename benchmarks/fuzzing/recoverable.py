@@ -11,10 +11,13 @@ import zstandard
 from mcap.reader import NonSeekingReader, SeekingReader
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterator
 
 _RECORD = struct.Struct('<BQ')
-_MESSAGE, _CHUNK = 5, 6
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 3, 4, 5, 6
+_TYPES = (b'sensor_msgs/msg/CompressedImage', b'builtin_interfaces/msg/Time')
+_MAGIC_BYTES = 8
+_TOPICS = (b'/camera', b'/epoch')
 _HEAD = struct.Struct('<HIQQ')
 _CHUNK_HEAD = struct.Struct('<QQQII')
 _LIMIT = 1 << 26
@@ -37,37 +40,36 @@ def found_by_library(content: bytes, intact: Collection[Key]) -> set[Key]:
 
 
 def found_record_by_record(content: bytes, intact: Collection[Key]) -> set[Key]:
-    """What a plain walk over the records finds, chunk by chunk."""
-    keys: set[Key] = set()
-    position = 8
-    while position + _RECORD.size <= len(content):
-        opcode, length = _RECORD.unpack_from(content, position)
-        start = position + _RECORD.size
-        if start + length > len(content):
-            break
-        if opcode == _MESSAGE:
-            _add(content[start : start + length], keys)
-        elif opcode == _CHUNK:
-            _walk(_unpacked(content[start : start + length]), keys)
-        position = start + length
-    return keys & set(intact)
+    """What a plain walk over the records finds, chunk by chunk.
+
+    A message counts if the walk finds its topic and its type, too: without them it is nothing.
+    """
+    found: list[tuple[int, Key]] = []
+    channels: dict[int, int] = {}
+    types: set[int] = set()
+    for opcode, record in _records(content[_MAGIC_BYTES:]):
+        inner = _records(_unpacked(record)) if opcode == _CHUNK else ((opcode, record),)
+        for kind, part in inner:
+            if kind == _MESSAGE and len(part) >= _HEAD.size:
+                channel, _, stamp_ns, _ = _HEAD.unpack_from(part)
+                found.append((channel, (stamp_ns, part[_HEAD.size :])))
+            elif kind == _CHANNEL and any(topic in part for topic in _TOPICS):
+                channel, schema = struct.unpack_from('<HH', part)
+                channels[channel] = schema
+            elif kind == _SCHEMA and any(name in part for name in _TYPES):
+                types.add(int.from_bytes(part[:2], 'little'))
+    return {key for channel, key in found if channels.get(channel) in types} & set(intact)
 
 
-def _walk(data: bytes, keys: set[Key]) -> None:
+def _records(data: bytes) -> Iterator[tuple[int, bytes]]:
     position = 0
     while position + _RECORD.size <= len(data):
         opcode, length = _RECORD.unpack_from(data, position)
         start = position + _RECORD.size
         if start + length > len(data):
             return
-        if opcode == _MESSAGE:
-            _add(data[start : start + length], keys)
+        yield opcode, data[start : start + length]
         position = start + length
-
-
-def _add(record: bytes, keys: set[Key]) -> None:
-    if len(record) >= _HEAD.size:
-        keys.add((_HEAD.unpack_from(record)[2], record[_HEAD.size :]))
 
 
 def _unpacked(chunk: bytes) -> bytes:

@@ -9,15 +9,14 @@ Tested by ``test/recordings/bag/test_find_bags.py``.
 from __future__ import annotations
 
 import struct
+from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
 from typing import TYPE_CHECKING, NamedTuple
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
 
 from nanorocks_ros.limits import CHUNK_BYTES, CHUNK_MESSAGES
+from nanorocks_ros.recordings.mcap.mcap_catalogue import Catalogue
 from nanorocks_ros.recordings.mcap.mcap_chunks import (
     FRAME_STARTS,
     UNREADABLE,
@@ -59,34 +58,6 @@ class StoredMessage(NamedTuple):
     data: memoryview
 
 
-class Catalogue:
-    """Channels and schemas read so far, by their ids.
-
-    Attributes
-    ----------
-    channels : dict of int to mcap.records.Channel
-    schemas : dict of int to mcap.records.Schema
-    contradictions : set of int
-        Channels and schemas of which two copies differ; the first is used.
-    """
-
-    def __init__(self) -> None:
-        self.channels: dict[int, Channel] = {}
-        self.schemas: dict[int, Schema] = {}
-        self.contradictions: set[int] = set()
-
-    def add(self, opcode: int, content: memoryview) -> None:
-        """Add a record if it is a channel or a schema."""
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(data_stream(content))
-            if self.schemas.setdefault(schema.id, schema) != schema:
-                self.contradictions.add(schema.id)
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(data_stream(content))
-            if self.channels.setdefault(channel.id, channel) != channel:
-                self.contradictions.add(channel.id)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
     """Consecutive complete records that are read together: a chunk, or messages outside chunks.
@@ -122,11 +93,6 @@ class Block:
     chunk: bool = False
     indexed: bool = False
     unverified: bool = False
-
-
-def data_stream(content: memoryview | bytes) -> ReadDataStream:
-    """Content of one record as a stream for the `mcap` library."""
-    return ReadDataStream(BytesIO(content))
 
 
 def iterate_records(data: memoryview, *, cut: bool = False) -> Iterator[tuple[int, memoryview]]:
@@ -176,6 +142,20 @@ def _collect(
             raise DamagedError(f'a record of kind {opcode} where a message must stand')
 
 
+def _collect_readable(
+    data: memoryview, catalogue: Catalogue, messages: list[StoredMessage]
+) -> None:
+    """As `_collect`, without records that cannot be read or are of another kind."""
+    for opcode, content in iterate_records(data, cut=True):
+        with suppress(*UNREADABLE):
+            if opcode == Opcode.MESSAGE:
+                messages.append(_message(content))
+            else:
+                catalogue.add(opcode, content)
+        if len(messages) > CHUNK_MESSAGES.value:
+            raise TooLargeError(CHUNK_MESSAGES)
+
+
 def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMessage]:
     """Load all messages of a block.
 
@@ -206,14 +186,15 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     try:
         if block.chunk:
             data = memoryview(_records_of_chunk(raw, block))
-            _collect(data, catalogue, messages, cut=block.cut or block.unverified)
+            if block.unverified:
+                _collect_readable(data, catalogue, messages)
+            else:
+                _collect(data, catalogue, messages, cut=block.cut)
         else:
             _collect(raw, catalogue, messages, cut=False)
     except ChecksumError:
         raise
     except UNREADABLE as error:
-        if block.unverified:
-            return messages
         _recover_catalogue(bytes(raw), catalogue)
         raise DamagedError(str(error)) from error
     if block.indexed and not _are_in_range(messages, block):

@@ -18,11 +18,10 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import (
     MAGIC,
     RECORD,
     Block,
-    Catalogue,
     StoredMessage,
-    data_stream,
     iterate_records,
 )
+from nanorocks_ros.recordings.mcap.mcap_catalogue import Catalogue, data_stream
 from nanorocks_ros.recordings.mcap.mcap_chunks import UNREADABLE
 from nanorocks_ros.recordings.storage import LAST_NS
 

@@ -23,6 +23,8 @@ _ANY_START = re.compile(rb'[\x02-\x0f][\s\S]{4}\x00{4}')
 _CHUNK_START = re.compile(rb'[\x02\x06-\x0f][\s\S]{4}\x00{4}')
 # Sound records needed in a row, the first included; less at the end of the file.
 _IN_A_ROW = 3
+# Length of records that may be cut at the end of a file, [bytes].
+_LONGEST = 1 << 28
 # Such records have fields that hardly any other bytes fill by chance.
 _TELLING = frozenset({Opcode.CHUNK, Opcode.CHUNK_INDEX, Opcode.STATISTICS, Opcode.MESSAGE_INDEX})
 
@@ -35,6 +37,8 @@ def is_record(stream: BinaryIO, head: Head, size: int) -> bool:
 def records_follow(stream: BinaryIO, position: int, size: int, count: int = 1) -> bool:
     """Whether sound records, or the end of the file, follow from this offset.
 
+    The last record may be cut short.
+
     Parameters
     ----------
     stream : binary file
@@ -46,10 +50,18 @@ def records_follow(stream: BinaryIO, position: int, size: int, count: int = 1) -
         if _is_end(stream, position, size):
             return True
         head = read_head(stream, position, size)
-        if head is None or not is_record(stream, head, size):
-            return False
+        # Fewer bytes than a head are the rest of a file that was cut short.
+        if head is None:
+            return position <= size
+        if not is_record(stream, head, size):
+            return _is_cut(head, size)
         position = head.end
     return True
+
+
+def _is_cut(head: Head, size: int) -> bool:
+    """Whether a record seems to be the last of a file that was cut short."""
+    return head.end > size and 0 < head.opcode <= Opcode.DATA_END and head.end < size + _LONGEST
 
 
 def _is_end(stream: BinaryIO, position: int, size: int) -> bool:
