@@ -34,7 +34,9 @@ def is_record(stream: BinaryIO, head: Head, size: int) -> bool:
     return head.opcode < FIRST_PRIVATE and is_sound(stream, head, size)
 
 
-def records_follow(stream: BinaryIO, position: int, size: int, count: int = 1) -> bool:
+def records_follow(
+    stream: BinaryIO, position: int, size: int, count: int = 1, boundary: int = 0
+) -> bool:
     """Whether sound records, or the end of the file, follow from this offset.
 
     The last record may be cut short.
@@ -45,9 +47,11 @@ def records_follow(stream: BinaryIO, position: int, size: int, count: int = 1) -
     position, size : int, [bytes]
     count : int
         Number of records.
+    boundary : int, [bytes]
+        Where a damaged chunk ends that holds the records; counts as the end of the file.
     """
     for _ in range(count):
-        if _is_end(stream, position, size):
+        if position == boundary or _is_end(stream, position, size):
             return True
         head = read_head(stream, position, size)
         # Fewer bytes than a head are the rest of a file that was cut short.
@@ -73,7 +77,9 @@ def _is_end(stream: BinaryIO, position: int, size: int) -> bool:
     return stream.read() == MAGIC
 
 
-def next_record(stream: BinaryIO, position: int, size: int, *, messages: bool) -> int | None:
+def next_record(
+    stream: BinaryIO, position: int, size: int, *, messages: bool, boundary: int = 0
+) -> int | None:
     """Offset of the next sound records; None if there are none.
 
     Parameters
@@ -82,6 +88,8 @@ def next_record(stream: BinaryIO, position: int, size: int, *, messages: bool) -
     position, size : int, [bytes]
     messages : bool
         Look for messages, channels and schemas, too.
+    boundary : int, [bytes]
+        See `records_follow`.
 
     Returns
     -------
@@ -92,7 +100,7 @@ def next_record(stream: BinaryIO, position: int, size: int, *, messages: bool) -
         stream.seek(position)
         data = stream.read(_WINDOW_BYTES)
         for match in starts.finditer(data):
-            if _begins_records(stream, position + match.start(), size):
+            if _begins_records(stream, position + match.start(), size, boundary):
                 return position + match.start()
         if len(data) <= _HEAD_BYTES:
             break
@@ -100,10 +108,10 @@ def next_record(stream: BinaryIO, position: int, size: int, *, messages: bool) -
     return None
 
 
-def _begins_records(stream: BinaryIO, position: int, size: int) -> bool:
+def _begins_records(stream: BinaryIO, position: int, size: int, boundary: int) -> bool:
     head = read_head(stream, position, size)
     if head is None or not is_record(stream, head, size):
         return False
     if head.opcode in _TELLING:
         return True
-    return records_follow(stream, head.end, size, _IN_A_ROW - 1)
+    return records_follow(stream, head.end, size, _IN_A_ROW - 1, boundary)

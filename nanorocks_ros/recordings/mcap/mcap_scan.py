@@ -56,6 +56,7 @@ class _Scanner:
         self._indexed = self._recovered = 0
         # Whether the messages behind it belong to a chunk whose checksum is wrong.
         self._descended = False
+        self._boundary = 0
         # Kinds of records on the top level so far.
         self._chunked = self._unchunked = self._packed = False
         self._at_end_of_data = False
@@ -119,6 +120,7 @@ class _Scanner:
             # Its records are read one by one; their checksum is known to be wrong, or unknown.
             self._mark_damage(head.start)
             self._descended = True
+            self._boundary = readable[0]
             return extent.content
         return self._leave_damaged_chunk(head, readable)
 
@@ -192,7 +194,9 @@ class _Scanner:
         # Compressed chunks hold parts of messages by chance, too: those are not looked for.
         if self._chunked and not self._unchunked and (self._packed or not self._salvaging):
             return telling
-        return next_record(self._stream, position + 1, self._size, messages=True)
+        return next_record(
+            self._stream, position + 1, self._size, messages=True, boundary=self._boundary
+        )
 
     def _note_kind(self, position: int | None) -> None:
         """Learn from a record behind damage that the file has chunks, compressed or not."""
