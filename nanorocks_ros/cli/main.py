@@ -95,6 +95,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         print(f'nanorocks: {_NO_MEMORY}', file=sys.stderr)
         return EXIT_INPUT
+    except RecursionError:
+        print(
+            'nanorocks: an input is nested too deeply; check where it comes from', file=sys.stderr
+        )
+        return EXIT_INPUT
     except OSError as error:
         from nanorocks_ros.outputs.safe_text import printable
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 _WINDOW_BYTES, _HEAD_BYTES = 1 << 20, 9
 # Start of a record that is shorter than 4 GB; looked ahead, so that candidates may overlap.
-# Starts of messages, channels and schemas are looked for only where they stand outside of chunks; a
-# damaged chunk holds such bytes, too.
+# Starts of messages, channels and schemas are looked for only where they stand outside of chunks:
+# a damaged chunk holds such bytes, too.
 _ANY_START = re.compile(rb'[\x02-\x0f](?=[\s\S]{4}\x00{4})')
 _CHUNK_START = re.compile(rb'[\x02\x06-\x0f](?=[\s\S]{4}\x00{4})')
 # Sound records needed in a row, the first included; less at the end of the file.
