@@ -25,7 +25,12 @@ import numpy as np
 
 from benchmarks.fuzzing.mutations import generator_of
 from nanorocks_ros.outputs.npz_archive import read_archive
+from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.recordings.bag.writer import BagWriter
+from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
+from nanorocks_ros.records import NS
+from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -69,7 +74,7 @@ def main(arguments: Sequence[str]) -> int:
             for number in range(options.count):
                 if number in done:
                     continue
-                name = tuple(_JOBS)[number % len(_JOBS)]
+                name = _ORDER[number % len(_ORDER)]
                 if name not in jobs:
                     jobs[name] = _JOBS[name](Path(folder) / name)
                 done[number] = [name, *jobs[name].kill(generator_of('kills', number))]
@@ -245,6 +250,41 @@ class _Salvage(_Resumed):
             shutil.rmtree(self._output)
 
 
+class _Batch(_Resumed):
+    """`nanorocks analyse` of several bags, which continues with those that are left."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir()
+        bags = [str(_write_bag(folder / f'bag_{number}', number)) for number in range(3)]
+        command = [*_NANOROCKS, 'analyse', *bags, '--trays', '1', '--workers', '1', '-o', 'OUTPUT']
+        super().__init__(folder, command, _results)
+
+
+def _write_bag(path: Path, number: int) -> Path:
+    """A bright square that moves over a gray tray."""
+    table = {topic.absolute(): offered_topic(topic) for topic in (topics.EPOCH, topics.RAW)}
+    start_ns = (1_500_000_000 + 100 * number) * NS
+    with BagWriter(path, table, metadata={}) as bag:
+        bag.write(topics.EPOCH.absolute(), start_ns, time_message(start_ns))
+        for frame in range(60):
+            pixels = np.full((210, 210), 120, np.uint8)
+            pixels[50:70, 20 + frame : 40 + frame] = 200
+            stamp_ns = start_ns + frame * NS // 30
+            message = image_message(stamp_ns, 'camera', 'mono8', pixels)
+            bag.write(topics.RAW.absolute(), stamp_ns, message)
+    return path
+
+
+def _results(path: Path) -> str:
+    digest = hashlib.sha256()
+    for table in sorted(path.rglob('*.csv')):
+        digest.update(f'{table.relative_to(path)}'.encode() + table.read_bytes())
+    for bag in sorted(path.rglob('results_bag')):
+        for message in open_bag(bag).messages():
+            digest.update(f'{message.topic} {message.log_time_ns}'.encode() + message.cdr)
+    return digest.hexdigest()
+
+
 def _messages(path: Path) -> str:
     digest = hashlib.sha256()
     bags = [path] if list(path.glob('*.mcap')) else sorted(path.iterdir())
@@ -278,4 +318,7 @@ _JOBS: dict[str, Callable[[Path], _Job]] = {
     'salvage': _Salvage,
     'import --each': _Import,
     'sweep': _Sweep,
+    'batch': _Batch,
 }
+# A batch takes the longest.
+_ORDER = ('recording', 'salvage', 'import --each', 'sweep') * 6 + ('batch',)
