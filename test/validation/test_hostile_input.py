@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import fuzz
+from benchmarks import fuzz, killed_jobs
 from benchmarks.fuzzing.mutations import damaged, generator_of
 from benchmarks.fuzzing.outcomes import BAD, NO_CHECKSUM, SAME, SILENT, Outcome
 from benchmarks.fuzzing.targets import KINDS, SHARES, target_of
@@ -83,3 +83,9 @@ def test_the_page_says_nothing_bad_of_what_has_checksums():
         assert [int(cell) for cell in row[6:]] == [0] * len(BAD)
     assert re.search(r'\| all \| \d{4}', PAGE.read_text())
     assert NO_CHECKSUM in PAGE.read_text()
+
+
+def test_a_killed_salvage_and_import_are_finished_by_the_same_command(tmp_path):
+    for name in ('salvage', 'import --each'):
+        job = killed_jobs.JOBS[name](tmp_path / name.split()[0])
+        assert job.kill(generator_of('kills', 3)) == (True, None)

@@ -16,7 +16,7 @@ from nanorocks_ros.recordings.mcap.mcap_heads import FIRST_PRIVATE, Head, is_sou
 if TYPE_CHECKING:
     from typing import BinaryIO
 
-_WINDOW_BYTES, _HEAD_BYTES = 1 << 20, 9
+_FIRST_WINDOW_BYTES, _WINDOW_BYTES, _HEAD_BYTES = 1 << 12, 1 << 20, 9
 # Start of a record that is shorter than 4 GB; looked ahead, so that candidates may overlap.
 # Starts of messages, channels and schemas are looked for only where they stand outside of chunks:
 # a damaged chunk holds such bytes, too.
@@ -97,9 +97,12 @@ def next_record(
     int or None, [bytes]
     """
     starts = _ANY_START if messages else _CHUNK_START
+    # Most damage is small: reading far ahead each time would make many damages slow.
+    window = _FIRST_WINDOW_BYTES
     while position < size:
         stream.seek(position)
-        data = stream.read(_WINDOW_BYTES)
+        data = stream.read(window)
+        window = min(4 * window, _WINDOW_BYTES)
         for match in starts.finditer(data):
             if _begins_records(stream, position + match.start(), size, boundary):
                 return position + match.start()

@@ -57,6 +57,8 @@ class _Scanner:
         # Whether the messages behind it belong to a chunk whose checksum is wrong.
         self._descended = False
         self._boundary = 0
+        # From where a record that is no message was looked for last, and where it is.
+        self._telling: tuple[int, int | None] = (size, None)
         # Kinds of records on the top level so far.
         self._chunked = self._unchunked = self._packed = False
         self._at_end_of_data = False
@@ -189,14 +191,27 @@ class _Scanner:
 
     def _next_record(self, position: int) -> int | None:
         """Offset of the next sound records behind a damaged one; None if there are none."""
-        telling = next_record(self._stream, position + 1, self._size, messages=False)
+        if self._unchunked:
+            return self._next_message(position)
+        telling = self._next_telling(position)
         self._note_kind(telling)
         # Compressed chunks hold parts of messages by chance, too: those are not looked for.
-        if self._chunked and not self._unchunked and (self._packed or not self._salvaging):
+        if self._chunked and (self._packed or not self._salvaging):
             return telling
+        return self._next_message(position)
+
+    def _next_message(self, position: int) -> int | None:
         return next_record(
             self._stream, position + 1, self._size, messages=True, boundary=self._boundary
         )
+
+    def _next_telling(self, position: int) -> int | None:
+        """The next record that is no message; looked for once, however many damages are before."""
+        searched, telling = self._telling
+        if not searched <= position or (telling is not None and telling <= position):
+            telling = next_record(self._stream, position + 1, self._size, messages=False)
+            self._telling = position, telling
+        return telling
 
     def _note_kind(self, position: int | None) -> None:
         """Learn from a record behind damage that the file has chunks, compressed or not."""
@@ -270,18 +285,9 @@ class _Scanner:
 
 
 def scan(stream: BinaryIO, size: int, *, salvaging: bool = False) -> McapIndex:
-    """Build an index by scanning the file, as far as it can be read.
+    """Build an index by scanning a file of this size, [bytes], as far as it can be read.
 
-    Parameters
-    ----------
-    stream : binary file
-    size : int, [bytes]
-    salvaging : bool
-        Use messages of chunks whose checksum is wrong, too; they are counted as unverified.
-
-    Returns
-    -------
-    McapIndex
+    For a salvage messages of chunks whose checksum is wrong are used, too, and counted.
     """
     scanner = _Scanner(stream, size, salvaging=salvaging)
     scanner.run()

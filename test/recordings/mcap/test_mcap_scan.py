@@ -12,6 +12,8 @@ from mcap.writer import Writer as McapWriter
 
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.salvage import salvage
+from nanorocks_ros.recordings.mcap import mcap_scan
+from nanorocks_ros.recordings.mcap.mcap_resync import next_record
 
 LAYOUTS = {
     'zstd': {'compression': CompressionType.ZSTD},
@@ -195,3 +197,31 @@ def test_our_own_bags_have_a_checksum_of_their_index(tmp_path, record):
         assert len(list(reader.iter_messages())) == 81
         footer = path.read_bytes()[-37:]
     assert struct.unpack_from('<I', footer, 25)[0]
+
+
+@pytest.mark.parametrize('layout', ['unchunked', 'plain'])
+def test_many_damages_are_looked_at_once_each(tmp_path, monkeypatch, layout):
+    """However many there are, the bytes that are read grow with the size of the file alone."""
+    path = write(tmp_path / 'x.mcap', layout)
+    whole = path.read_bytes()
+    start = chunks(path)[0].chunk_start_offset + 49 if layout == 'plain' else 42
+    message = struct.pack('<BQHIQQ', 5, 22, 1, 0, 1, 1)
+    hostile = (message * 4 + b'\xff') * 3000
+    head = bytearray(whole[:start])
+    if layout == 'plain':
+        struct.pack_into('<Q', head, start - 8, len(hostile) + 10_000_000)
+    path.write_bytes(bytes(head) + hostile + bytes(2_000_000))
+    searched = 0
+
+    def counting(stream, position, size, **options):
+        nonlocal searched
+        place = next_record(stream, position, size, **options)
+        searched += (size if place is None else place) - position
+        return place
+
+    monkeypatch.setattr(mcap_scan, 'next_record', counting)
+    with path.open('rb') as stream:
+        size = path.stat().st_size
+        index = mcap_scan.scan(stream, size, salvaging=True)
+    assert index.total > 10_000
+    assert searched < 5 * size
