@@ -94,7 +94,8 @@ def check_new_folder(path: Path) -> None:
     while not os.path.lexists(folder):
         folder = folder.parent
     if not folder.is_dir():
-        raise RecordingError(str(path), f'{folder} is no folder', 'write elsewhere')
+        what = 'is no folder' if folder == path else f'{folder} is no folder'
+        raise RecordingError(str(path), what, 'write elsewhere')
     if not os.access(folder, os.W_OK | os.X_OK):
         raise RecordingError(
             str(path), f'the folder {folder} cannot be written to', 'write elsewhere'

@@ -49,4 +49,4 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_input_is_read(
     (tmp_path / 'file').touch()
     output = tmp_path / 'file' / 'bag'
     assert command.main([name, str(tmp_path / 'missing'), '-o', str(output)]) == 1
-    assert 'file is no folder; write elsewhere' in capsys.readouterr().err
+    assert 'is no folder; write elsewhere' in capsys.readouterr().err

@@ -113,5 +113,5 @@ def test_results_are_as_readable_as_other_files(tmp_path):
 
 def test_a_folder_below_a_file_is_refused_before_the_work(tmp_path):
     (tmp_path / 'file').touch()
-    with pytest.raises(RecordingError, match='file is no folder; write elsewhere'):
+    with pytest.raises(RecordingError, match='is no folder; write elsewhere'):
         check_outputs({'--bag': tmp_path / 'file' / 'deep' / 'bag'}, {})
