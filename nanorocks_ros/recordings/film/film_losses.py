@@ -43,7 +43,7 @@ class FilmLosses:
         self._packets = 0
 
     def note(self, time_ns: int | None) -> None:
-        """A packet that holds data, with the time at which it is shown."""
+        """A packet of the film, with the time at which it is shown."""
         self._packets += 1
         if time_ns is not None and abs(time_ns) < 2**62:
             self._times_ns.append(time_ns)

@@ -257,7 +257,8 @@ class Video:
                 return
             if packet is None:
                 return
-            if packet.size and not packet.is_discard:
+            # Those that are not shown and repeats without content are stated, too.
+            if packet.size or packet.dts is not None:
                 self._losses.note(_shown_ns(packet, stream))
             if packet.pos is not None and self._bytes:
                 done = min(1.0, max(done, packet.pos / self._bytes))
