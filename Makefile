@@ -83,7 +83,7 @@ venv: ## Set up the environment that all of these use
 	@sh requirements/set_up.sh $(SET_UP)
 
 # For maintainers: the other targets only read the lock files. Needs `uv` (pip install uv).
-COMPILE := uv pip compile --quiet --universal --python-version 3.10 --no-annotate \
+COMPILE := uv pip compile --quiet --universal --python-version 3.10 --no-annotate --generate-hashes \
            --no-emit-package nanorocks-ros --custom-compile-command 'make lock' setup.cfg
 lock: ## Renew the lock files in requirements/ (needs uv)
 	@$(COMPILE) --upgrade --extra dev --extra ros --output-file requirements/wheels.txt

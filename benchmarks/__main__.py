@@ -1,6 +1,8 @@
 """``python -m benchmarks [NAME ...]``: run the benchmarks, all or those named.
 
 ``python -m benchmarks golden [OPTION ...]`` is a check, not a measurement; see its ``--help``.
+``python -m benchmarks fuzz [OPTION ...]`` damages every kind of input; see its ``--help``.
+``python -m benchmarks kills [OPTION ...]`` kills jobs at random instants and resumes them.
 ``python -m benchmarks structure [COMMIT]`` counts modules and lines.
 """
 
@@ -9,7 +11,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from benchmarks import golden, structure
+from benchmarks import fuzz, golden, kills, structure
 
 ALL = (
     'offline',
@@ -65,9 +67,13 @@ ALL = (
 
 
 def main() -> int:
-    """Run each benchmark and print its report, or one of the two checks."""
+    """Run each benchmark and print its report, or one of the four checks."""
     if sys.argv[1:2] == ['golden']:
         return golden.main(sys.argv[2:])
+    if sys.argv[1:2] == ['fuzz']:
+        return fuzz.main(sys.argv[2:])
+    if sys.argv[1:2] == ['kills']:
+        return kills.main(sys.argv[2:])
     if sys.argv[1:2] == ['structure']:
         structure.report(*sys.argv[2:3])
         return 0

@@ -99,8 +99,10 @@ if [ "$(stored dependencies)" != "$wanted" ]; then
     # shellcheck disable=SC2086  # empty, or one word
     logged 'make the environment' "$interpreter" -m venv $options "$folder"
     # Builds what comes as source (empy, lark-parser), as locked.
-    logged 'install setuptools' pip_install "$(grep -o '^setuptools==[0-9.]*' "$lock")"
-    logged "install $lock" pip_install --use-pep517 -r "$lock"
+    # The lines of setuptools in the lock file, with its hashes.
+    awk '/^setuptools==/ { on = 1 } on { print; if (!/\\$/) exit }' "$lock" >"$folder/setuptools.txt"
+    logged 'install setuptools' pip_install --require-hashes -r "$folder/setuptools.txt"
+    logged "install $lock" pip_install --require-hashes --use-pep517 -r "$lock"
     echo "$interpreter" >"$folder/interpreter"
     echo "$wanted" >"$folder/dependencies"
 fi

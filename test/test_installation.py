@@ -127,3 +127,23 @@ def test_a_plain_installation_has_its_package_data(source_copy, tmp_path):
     assert page.split() == sorted(path.name for path in source.iterdir())
     for name in EXECUTABLES:
         assert os.access(tmp_path / 'lib' / 'nanorocks_ros' / name, os.X_OK)
+
+
+@pytest.mark.parametrize('lock', ['wheels', 'jazzy', 'oldest'])
+def test_every_locked_package_has_its_hashes(lock):
+    text = (ROOT / 'requirements' / f'{lock}.txt').read_text()
+    blocks = [block for block in re.split(r'\n(?=\S)', text) if not block.startswith('#')]
+    assert len(blocks) > 50
+    for block in blocks:
+        assert re.match(r'[a-z0-9-]+==\S+', block), block[:80]
+        assert re.search(r'--hash=sha256:[0-9a-f]{64}', block), block[:80]
+
+
+def test_an_environment_is_made_with_hashes_alone():
+    """Both installations from a lock file, and the lock files are made with them."""
+    script = (ROOT / 'requirements' / 'set_up.sh').read_text()
+    calls = re.findall(r'pip_install (.*) -r ', script)
+    assert len(calls) == 2
+    assert all('--require-hashes' in call for call in calls)
+    makefile = (ROOT / 'Makefile').read_text()
+    assert '--generate-hashes' in makefile

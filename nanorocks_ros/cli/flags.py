@@ -11,6 +11,8 @@ import yaml
 
 from nanorocks_ros.cli.films import accept_films
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.yaml_limits import load_yaml
+from nanorocks_ros.experiment.yaml_lines import read_text
 from nanorocks_ros.settings import (
     PipelineSettings,
     SettingRow,
@@ -165,11 +167,7 @@ def _words(text: str | list[str]) -> list[str]:
 
 def _from_file(path: Path) -> dict[str, Any]:
     """Values of a ROS parameter file: every ``ros__parameters`` block, nested or dotted."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        reason = getattr(error, 'strerror', None) or 'is not YAML'
-        raise ConfigurationError(str(path), reason, 'name a ROS parameter file') from error
+    content = load_yaml(str(path), read_text(path, 'a ROS parameter file'))
     values: dict[str, Any] = {}
     for node in content.values() if isinstance(content, dict) else ():
         if isinstance(node, dict) and isinstance(node.get('ros__parameters'), dict):

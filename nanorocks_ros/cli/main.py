@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 EXIT_INPUT = 1
 EXIT_CALL = 2
 EXIT_INTERRUPTED = 130
+_NO_MEMORY = (
+    'the memory is full; close other programs, pass fewer --workers, or take a machine with more'
+)
 
 
 COMMANDS = {
@@ -96,6 +99,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of the output closed the pipe.
         sys.stderr.close()
         return 0
+    except MemoryError:
+        print(f'nanorocks: {_NO_MEMORY}', file=sys.stderr)
+        return EXIT_INPUT
+    except RecursionError:
+        print(
+            'nanorocks: an input is nested too deeply; check where it comes from', file=sys.stderr
+        )
+        return EXIT_INPUT
     except OSError as error:
         from nanorocks_ros.outputs.safe_text import printable
 

@@ -8,7 +8,7 @@ import ipaddress
 import secrets
 import socket
 import time
-from collections import deque
+from collections import OrderedDict, deque
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 SHORTEST_TOKEN = 12
-# Failed attempts per minute, from all clients, after which all are refused.
+# Failed attempts per minute of one source, after which it is refused; others are not. Sources that
+# are remembered: above that the one that failed first is forgotten.
 _MOST_FAILURES, _PER_S = 30, 60.0
+_MOST_SOURCES = 4096
 
 
 class Access:
@@ -31,6 +33,8 @@ class Access:
         Address to listen on.
     token : str
         Empty: none on a loopback address, elsewhere one is made up.
+    encrypted : bool
+        Whether the page is served by HTTPS; then the cookie is never sent without.
 
     Raises
     ------
@@ -40,7 +44,7 @@ class Access:
         For a host that has no address.
     """
 
-    def __init__(self, host: str, token: str) -> None:
+    def __init__(self, host: str, token: str, *, encrypted: bool = False) -> None:
         if token and (len(token) < SHORTEST_TOKEN or not token.isascii() or ' ' in token):
             raise ConfigurationError(
                 'token',
@@ -48,9 +52,10 @@ class Access:
                 f'choose {SHORTEST_TOKEN} or more letters and digits, or leave it empty',
             )
         self.host = host
+        self.encrypted = encrypted
         self.is_local = is_loopback(host)
         self.token = token or ('' if self.is_local else secrets.token_urlsafe(18))
-        self._failures: deque[float] = deque(maxlen=_MOST_FAILURES)
+        self._failures: OrderedDict[str, deque[float]] = OrderedDict()
 
     @property
     def cookie(self) -> str:
@@ -78,25 +83,29 @@ class Access:
         except ValueError:
             return False
 
-    def is_token(self, text: str) -> bool:
-        """Whether a text is the token; a wrong text counts as a failed attempt."""
+    def is_token(self, text: str, source: str = '') -> bool:
+        """Whether a text is the token; a wrong text counts as a failed attempt of its source."""
         right = bool(self.token) and _same(text, self.token)
         if not right:
-            self._failures.append(time.monotonic())
+            failures = self._failures.setdefault(source, deque(maxlen=_MOST_FAILURES))
+            failures.append(time.monotonic())
+            while len(self._failures) > _MOST_SOURCES:
+                self._failures.popitem(last=False)
         return right
 
-    def is_known(self, headers: Mapping[str, str], cookie: str) -> bool:
+    def is_known(self, headers: Mapping[str, str], cookie: str, source: str = '') -> bool:
         """Whether a request has the cookie, or the token in a header."""
         if not self.token or _same(cookie, self.cookie):
             return True
         kind, _, given = headers.get('Authorization', '').partition(' ')
-        return kind == 'Bearer' and not self.is_tired and self.is_token(given)
+        return kind == 'Bearer' and not self.is_locked_out(source) and self.is_token(given, source)
 
-    @property
-    def is_tired(self) -> bool:
-        """Whether the limit of failed attempts per minute is reached."""
-        full = len(self._failures) == _MOST_FAILURES
-        return full and time.monotonic() - self._failures[0] < _PER_S
+    def is_locked_out(self, source: str) -> bool:
+        """Whether a source has reached the limit of failed attempts per minute."""
+        failures = self._failures.get(source)
+        if failures is None or len(failures) < _MOST_FAILURES:
+            return False
+        return time.monotonic() - failures[0] < _PER_S
 
 
 def is_loopback(host: str) -> bool:

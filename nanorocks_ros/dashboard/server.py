@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros import __version__
 from nanorocks_ros.dashboard.access import Access
 from nanorocks_ros.dashboard.clients import Client, Look, Pictures
+from nanorocks_ros.dashboard.encryption import encryption
+from nanorocks_ros.dashboard.gate import Gate, GateLimits
 from nanorocks_ros.dashboard.page_process import TOKEN_VARIABLE
 from nanorocks_ros.errors import DashboardError
 
@@ -48,6 +50,17 @@ def _is_our_fault(record: logging.LogRecord) -> bool:
     return not isinstance(error, HttpProcessingError | web.RequestPayloadError)
 
 
+def _note_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Say in one line what the system refuses, such as a connection without a free descriptor."""
+    error = context.get('exception')
+    if isinstance(error, OSError):
+        # Sockets that the other side has closed are no fault at all.
+        if not isinstance(error, ConnectionError):
+            _requests.warning('%s: %s', context.get('message', 'the live page'), error)
+        return
+    loop.default_exception_handler(context)
+
+
 _requests = logging.getLogger(__name__)
 _requests.addFilter(_is_our_fault)
 
@@ -63,13 +76,29 @@ class PageServer:
     board : Board
     namespace : str
         Of the graph, for the page.
+    limits : GateLimits, optional
+
+    Raises
+    ------
+    ConfigurationError
+        For a token that can be guessed, or a certificate that cannot be used.
     """
 
-    def __init__(self, settings: DashboardSettings, board: Board, namespace: str) -> None:
+    def __init__(
+        self,
+        settings: DashboardSettings,
+        board: Board,
+        namespace: str,
+        limits: GateLimits | None = None,
+    ) -> None:
         self._settings, self._board = settings, board
         self._greeting = {'namespace': namespace, 'version': __version__}
         token = settings.token or os.environ.get(TOKEN_VARIABLE, '')
-        self._access = Access(settings.host, token)
+        self._encryption = encryption(settings.certificate, settings.private_key)
+        encrypted = self._encryption is not None
+        self._access = Access(settings.host, token, encrypted=encrypted)
+        self._gate = Gate(limits or GateLimits())
+        self._listener: asyncio.Server | None = None
         self._pictures = Pictures()
         self._clients: set[Client] = set()
         self._loop = asyncio.new_event_loop()
@@ -96,7 +125,8 @@ class PageServer:
             host = socket.gethostname()
         shown = f'[{host}]' if ':' in host else host
         query = f'?token={self._access.token}' if self._access.token else ''
-        return f'http://{shown}:{self._port}/{query}'
+        scheme = 'http' if self._encryption is None else 'https'
+        return f'{scheme}://{shown}:{self._port}/{query}'
 
     def start(self) -> None:
         """Listen.
@@ -164,25 +194,36 @@ class PageServer:
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
+        self._loop.set_exception_handler(_note_fault)
         self._loop.run_forever()
         self._loop.close()
 
     async def _open(self) -> None:
-        application = make_site(self._access, self._port, self._live)
+        application = make_site(self._access, self._port, self._live, self._gate)
         self._runner = web.AppRunner(
             application,
             access_log=None,
             logger=_requests,
             shutdown_timeout=_FAREWELL_S,
             handle_signals=False,
+            keepalive_timeout=self._gate.limits.patience_s,
         )
         await self._runner.setup()
-        site = web.TCPSite(self._runner, self._settings.host, self._port)
-        await site.start()
-        self._port = self._runner.addresses[0][1]
+        make = self._runner.server
+        assert make is not None
+        self._listener = await self._loop.create_server(
+            lambda: self._gate.protocol(make),
+            self._settings.host or None,
+            self._port,
+            ssl=self._encryption,
+            backlog=128,
+        )
+        self._port = self._listener.sockets[0].getsockname()[1]
 
     async def _close(self) -> None:
         await asyncio.gather(*(client.close() for client in self._clients), return_exceptions=True)
+        if self._listener is not None:
+            self._listener.close()
         if self._runner is not None:
             await self._runner.cleanup()
 
@@ -195,7 +236,11 @@ class PageServer:
             compress=False,
             timeout=_FAREWELL_S,
         )
-        await connection.prepare(request)
+        try:
+            await connection.prepare(request)
+        except ValueError:
+            # aiohttp expects plain ASCII in the heads of the handshake.
+            return web.Response(status=400, text='no handshake\n')
         pause_s = 1.0 / self._settings.picture_rate
         client = Client(connection, self._board, self._pictures, pause_s)
         self._clients.add(client)

@@ -8,14 +8,17 @@ from __future__ import annotations
 import asyncio
 import hashlib
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from aiohttp import web
+
+from nanorocks_ros.dashboard.gate import RequestRate, source_of
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
     from nanorocks_ros.dashboard.access import Access
+    from nanorocks_ros.dashboard.gate import Gate
 
     Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -40,6 +43,9 @@ _HEADERS = {
     'Cache-Control': 'no-cache',
     'Server': 'nanorocks',
 }
+LIVE = '/live'
+"""Path of the live connection."""
+
 _MOST_POSTED_BYTES = 4096
 _YEAR_S = 365 * 86400
 # Served without a token.
@@ -47,7 +53,7 @@ _IN_FRONT = frozenset(('/login', '/style.css', '/icon.svg'))
 _AFTER_A_WRONG_TOKEN_S = 0.5
 
 
-def make_site(access: Access, port: int, live: Handler) -> web.Application:
+def make_site(access: Access, port: int, live: Handler, gate: Gate) -> web.Application:
     """The routes, behind the checks of who asks.
 
     Parameters
@@ -57,17 +63,42 @@ def make_site(access: Access, port: int, live: Handler) -> web.Application:
         Tells the cookies of two pages on one host apart.
     live : coroutine function
         Takes the live connection.
+    gate : Gate
     """
     entrance = _Entrance(access, f'nanorocks_{port}')
-    site = web.Application(middlewares=[entrance.check], client_max_size=_MOST_POSTED_BYTES)
+    middlewares = [_timed(gate), entrance.check]
+    site = web.Application(middlewares=middlewares, client_max_size=_MOST_POSTED_BYTES)
     site.on_response_prepare.append(_add_headers)
     site.router.add_get('/', entrance.page)
-    site.router.add_get('/live', live)
+    site.router.add_get(LIVE, live)
     site.router.add_get('/login', entrance.ask)
     site.router.add_post('/login', entrance.log_in)
     for name, content, kind in _files():
         site.router.add_get(f'/{name}', _served(content, kind))
     return site
+
+
+def _timed(gate: Gate) -> Any:
+    """Limit how often a source asks, and how long the body of a request takes."""
+    rate = RequestRate(gate.limits)
+
+    @web.middleware
+    async def limit(request: web.Request, handler: Handler) -> web.StreamResponse:
+        if not rate.allows(source_of(request.remote or '')):
+            return web.Response(
+                status=429, text='too many requests\n', headers={'Retry-After': '1'}
+            )
+        gate.working(request.protocol, busy=True)
+        try:
+            if request.path == LIVE:
+                return await handler(request)
+            return await asyncio.wait_for(handler(request), gate.limits.patience_s)
+        except asyncio.TimeoutError:
+            return _refused(408, 'the request took too long')
+        finally:
+            gate.working(request.protocol, busy=False)
+
+    return limit
 
 
 def _files() -> list[tuple[str, bytes, str]]:
@@ -115,7 +146,9 @@ class _Entrance:
         origin = request.headers.get('Origin')
         if not self._access.origin_is_ours(origin, request.host):
             return _refused(403, 'asked for by a page of somebody else')
-        known = self._access.is_known(request.headers, request.cookies.get(self._cookie, ''))
+        cookie = request.cookies.get(self._cookie, '')
+        source = source_of(request.remote or '')
+        known = self._access.is_known(request.headers, cookie, source)
         if known or request.path in _IN_FRONT:
             return await handler(request)
         if request.path == '/':
@@ -126,7 +159,7 @@ class _Entrance:
         given = request.query.get('token')
         if given is None:
             return web.Response(status=303, headers={'Location': '/login'})
-        return await self._answer(given)
+        return await self._answer(given, source_of(request.remote or ''))
 
     async def page(self, request: web.Request) -> web.StreamResponse:
         """The page; a token in the address is moved to the cookie: addresses are stored."""
@@ -144,17 +177,24 @@ class _Entrance:
             given = (await request.post()).get('token', '')
         except (ValueError, LookupError, web.RequestPayloadError):
             return _refused(400, 'not what the form says')
-        return await self._answer(given.strip() if isinstance(given, str) else '')
+        text = given.strip() if isinstance(given, str) else ''
+        return await self._answer(text, source_of(request.remote or ''))
 
-    async def _answer(self, given: str) -> web.StreamResponse:
+    async def _answer(self, given: str, source: str) -> web.StreamResponse:
         if not self._access.token:
             return web.Response(status=303, headers={'Location': '/'})
-        if self._access.is_tired or not self._access.is_token(given):
+        locked = self._access.is_locked_out(source)
+        if locked or not self._access.is_token(given, source):
             await asyncio.sleep(_AFTER_A_WRONG_TOKEN_S)
             return web.Response(status=303, headers={'Location': '/login#wrong'})
         response = web.Response(status=303, headers={'Location': '/'})
         response.set_cookie(
-            self._cookie, self._access.cookie, httponly=True, samesite='Strict', max_age=_YEAR_S
+            self._cookie,
+            self._access.cookie,
+            httponly=True,
+            samesite='Strict',
+            max_age=_YEAR_S,
+            secure=self._access.encrypted,
         )
         return response
 

@@ -19,6 +19,8 @@ YAML, with the lens as in sensor_msgs/CameraInfo, so that other tools can read i
 from __future__ import annotations
 
 import math
+import os
+import secrets
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -149,11 +151,24 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
     for number, region in sorted(calibration.regions.items()):
         lines.append(f'  {number}: [{", ".join(str(side) for side in region)}]')
     try:
-        path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        _write_whole(path, '\n'.join(lines) + '\n')
     except OSError as error:
         raise ConfigurationError(
             str(path), error.strerror or 'cannot be written', 'write elsewhere'
         ) from error
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file, complete or not at all; `outputs` is of a layer that may not be used here."""
+    part = path.with_name(f'.{path.stem}.{secrets.token_hex(8)}.part')
+    try:
+        with part.open('x', encoding='utf-8') as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def calibrated(settings: PipelineSettings) -> PipelineSettings:

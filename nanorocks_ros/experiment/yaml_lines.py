@@ -12,6 +12,8 @@ from typing import Any
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.yaml_limits import check_yaml
+from nanorocks_ros.limits import YAML_BYTES, require_regular_file
 
 
 def parse_yaml(name: str, text: str) -> yaml.Node | None:
@@ -26,8 +28,9 @@ def parse_yaml(name: str, text: str) -> yaml.Node | None:
     Raises
     ------
     ConfigurationError
-        When it is not YAML; names the line.
+        When it is not YAML or exceeds a limit; names the line.
     """
+    check_yaml(name, text)
     try:
         return yaml.compose(text, Loader=yaml.SafeLoader)
     except RecursionError as error:
@@ -85,7 +88,9 @@ def read_text(path: Path, expected: str) -> str:
     ConfigurationError
         When it cannot be read.
     """
+    require_regular_file(path, ConfigurationError)
     try:
+        YAML_BYTES.check(path.stat().st_size, str(path), ConfigurationError)
         return path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
@@ -145,9 +150,12 @@ class YamlLines:
         if not isinstance(node, yaml.ScalarNode):
             raise self.error(node, 'expected a single value', 'correct this line')
         try:
-            return yaml.safe_load(node.value) if node.style is None else node.value
-        except (yaml.YAMLError, ValueError) as error:
-            raise self.error(node, f'{node.value!r} cannot be read', 'correct it') from error
+            value = yaml.safe_load(node.value) if node.style is None else node.value
+        except (yaml.YAMLError, ValueError, OverflowError) as error:
+            raise self.error(node, f'{node.value[:40]!r} cannot be read', 'correct it') from error
+        if isinstance(value, dict | list | set):
+            raise self.error(node, 'expected a single value', 'correct this line')
+        return value
 
     def number(self, node: yaml.Node, what: str = 'finite number') -> float:
         """A number that is finite."""

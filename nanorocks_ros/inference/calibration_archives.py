@@ -5,6 +5,7 @@ Tested by ``test/inference/decay/test_decay_library.py``.
 
 from __future__ import annotations
 
+import struct
 import zipfile
 import zlib
 from importlib import resources
@@ -13,7 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from nanorocks_ros.archive_limits import check_archive
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.limits import require_regular_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -23,7 +26,19 @@ if TYPE_CHECKING:
 Content = TypeVar('Content')
 
 # Raised by numpy, zipfile and `parse` for files of other content.
-_DAMAGE = (ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    EOFError,
+    RuntimeError,
+    ArithmeticError,
+    MemoryError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def load_archive(
@@ -57,7 +72,11 @@ def load_archive(
     """
     remedy = f'make it again with `{command}`'
     source: Any = resources.files(package).joinpath(name) if package else Path(name)
+    if not package:
+        require_regular_file(name, ConfigurationError)
     try:
+        with source.open('rb') as stream:
+            check_archive(stream, name, ConfigurationError)
         with source.open('rb') as stream, np.load(stream, allow_pickle=False) as arrays:
             return parse(arrays)
     except FileNotFoundError as error:

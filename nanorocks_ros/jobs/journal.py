@@ -13,7 +13,9 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import LOCK, lock_folder
+from nanorocks_ros.limits import require_regular_file
 from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import parse_object
 from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive
 
 if TYPE_CHECKING:
@@ -62,6 +64,7 @@ class Journal:
             write_bytes(path, specification.encode())
             return
         try:
+            require_regular_file(path, RecordingError)
             earlier = path.read_text(encoding='utf-8')
         except (OSError, UnicodeDecodeError) as error:
             raise RecordingError(
@@ -184,12 +187,9 @@ def difference(actual: str, wanted: str) -> str:
     actual, wanted : str
     """
     try:
-        left, right = json.loads(actual), json.loads(wanted)
-    except ValueError:
+        left, right = _flat(parse_object(actual)), _flat(parse_object(wanted))
+    except (ValueError, RecursionError):
         return 'its specification cannot be read'
-    if not (isinstance(left, dict) and isinstance(right, dict)):
-        return 'its specification cannot be read'
-    left, right = _flat(left), _flat(right)
     names = [name for name in {**left, **right} if left.get(name) != right.get(name)]
     shown = [f'{name}: {_short(left.get(name))}, not {_short(right.get(name))}' for name in names]
     remainder = f' and {len(shown) - 3} more' if len(shown) > 3 else ''

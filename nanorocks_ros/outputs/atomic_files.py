@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
+import time
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
@@ -11,6 +13,11 @@ from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingEr
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
+
+
+# Parts of killed processes are deleted when they are older, [s].
+_OLD_S = 3600.0
+_LONGEST_STEM = 100
 
 
 def check_outputs(
@@ -58,6 +65,7 @@ def _check_target(path: Path, *, folder: bool, force: bool) -> None:
             str(path), 'exists already and is not overwritten', 'name another, or add --force'
         )
     if folder:
+        check_new_folder(path)
         return
     if not path.parent.is_dir():
         raise RecordingError(
@@ -66,6 +74,31 @@ def _check_target(path: Path, *, folder: bool, force: bool) -> None:
     if not os.access(path.parent, os.W_OK):
         raise RecordingError(
             str(path), f'the folder {path.parent} cannot be written to', 'write elsewhere'
+        )
+
+
+def check_new_folder(path: Path) -> None:
+    """Raise where a folder could not be made, before the work.
+
+    Parameters
+    ----------
+    path : Path
+        May exist; its parents are made with it.
+
+    Raises
+    ------
+    RecordingError
+        When a part of the path is no folder, or cannot be written to.
+    """
+    folder = path
+    while not os.path.lexists(folder):
+        folder = folder.parent
+    if not folder.is_dir():
+        what = 'is no folder' if folder == path else f'{folder} is no folder'
+        raise RecordingError(str(path), what, 'write elsewhere')
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise RecordingError(
+            str(path), f'the folder {folder} cannot be written to', 'write elsewhere'
         )
 
 
@@ -91,13 +124,14 @@ def atomic_file(path: Path, error_type: type[NanorocksError] = RecordingError) -
     NanorocksError
         Of `error_type`, when the file cannot be written.
     """
-    part = path.with_name(f'.{path.stem}.part{path.suffix}')
     try:
+        part = _new_part(path)
         try:
             yield part
             with part.open('rb+') as stream:
                 os.fsync(stream.fileno())
             os.replace(part, path)
+            _sync_folder(path.parent)
         finally:
             with suppress(OSError):
                 part.unlink(missing_ok=True)
@@ -107,6 +141,37 @@ def atomic_file(path: Path, error_type: type[NanorocksError] = RecordingError) -
             f'cannot be written ({error.strerror or error})',
             'make room, or write elsewhere',
         ) from error
+
+
+def _new_part(path: Path) -> Path:
+    """A new empty file beside a path, under a name that nobody can foresee.
+
+    A name that is known beforehand could be a link that somebody else put there.
+    """
+    start, ending = f'.{path.stem[:_LONGEST_STEM]}.', f'.part{path.suffix}'
+    _delete_old_parts(path.parent, start, ending)
+    part = path.parent / f'{start}{secrets.token_hex(8)}{ending}'
+    os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    return part
+
+
+def _delete_old_parts(folder: Path, start: str, ending: str) -> None:
+    """Delete what killed processes left; younger files may belong to a process that runs."""
+    with suppress(OSError):
+        for file in folder.iterdir():
+            is_part = file.name.startswith(start) and file.name.endswith(ending)
+            if is_part and time.time() - file.lstat().st_mtime > _OLD_S:
+                file.unlink(missing_ok=True)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Force the new name to the disk; some file systems cannot, and need not."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def write_bytes(path: Path, content: bytes) -> None:

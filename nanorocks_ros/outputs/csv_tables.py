@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import require_regular_file
 from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
@@ -64,7 +65,10 @@ def read_csv(path: Path) -> tuple[list[str], list[list[str]]]:
         When the file cannot be read.
     ValueError, csv.Error
         When it is empty, or is not text in UTF-8 separated by commas.
+    RecordingError
+        When it is no regular file.
     """
+    require_regular_file(path, RecordingError)
     with path.open(encoding='utf-8', newline='') as stream:
         header, *rows = [row for row in csv.reader(stream) if row]
     return [name.split('[')[0].strip() for name in header], rows

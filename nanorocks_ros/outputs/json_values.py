@@ -2,8 +2,49 @@
 
 from __future__ import annotations
 
+import json
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import TEXT_BYTES, require_regular_file
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def parse_object(text: str) -> dict[str, Any]:
+    """A JSON object.
+
+    Raises
+    ------
+    ValueError
+        If it is no JSON, nested too deeply, or anything else than an object.
+    """
+    try:
+        content = json.loads(text)
+    except RecursionError as error:
+        raise ValueError('nested too deeply') from error
+    if not isinstance(content, dict):
+        raise ValueError('no JSON object')
+    return content
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """The JSON object in a file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it holds anything else.
+    RecordingError
+        If it is no regular file, or above the limit.
+    """
+    require_regular_file(path, RecordingError)
+    TEXT_BYTES.check(path.stat().st_size, str(path))
+    return parse_object(path.read_text('utf-8'))
 
 
 def finite_or_none(value: float) -> float | None:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nanorocks_ros.archive_limits import check_archive
 from nanorocks_ros.errors import NanorocksError, RecordingError
+from nanorocks_ros.limits import ARRAY_BYTES, require_regular_file
 from nanorocks_ros.outputs.atomic_files import atomic_file
 
 if TYPE_CHECKING:
@@ -31,6 +33,9 @@ _DAMAGE = (
     OSError,
     RuntimeError,
     ValueError,
+    NotImplementedError,
+    OverflowError,
+    MemoryError,
 )
 
 
@@ -75,13 +80,16 @@ def read_archive(path: Path) -> Arrays:
     RecordingError
         When the file cannot be read, is cut short or damaged, or holds anything but arrays.
     """
+    require_regular_file(path, RecordingError)
     try:
+        ARRAY_BYTES.check(path.stat().st_size, str(path))
         content = path.read_bytes()
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'name another file'
         ) from error
     try:
+        check_archive(io.BytesIO(content), str(path), RecordingError)
         # Checksums first: a damaged header may ask for any amount of memory.
         with zipfile.ZipFile(io.BytesIO(content)) as members:
             if members.testzip() is not None:

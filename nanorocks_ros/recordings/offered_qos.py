@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import yaml
 from rosbags.interfaces import (
     Qos,
     QosDurability,
@@ -17,6 +16,9 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.yaml_limits import load_yaml
 
 # The infinite duration of ROS 2.
 _FOREVER = QosTime(9223372036, 854775807)
@@ -75,11 +77,11 @@ def recorded_qos(text: str) -> OfferedQos | None:
         None if the text is empty or cannot be parsed.
     """
     try:
-        profiles: Any = yaml.safe_load(text) or []
+        profiles: Any = load_yaml('quality of service', text) or []
         return OfferedQos(
             reliable=any(profile['reliability'] in _RELIABLE for profile in profiles),
             transient_local=any(profile['durability'] in _TRANSIENT_LOCAL for profile in profiles),
             depth=max(max(1, int(profile['depth'])) for profile in profiles),
         )
-    except (yaml.YAMLError, TypeError, KeyError, ValueError, RecursionError):
+    except (ConfigurationError, TypeError, KeyError, ValueError, OverflowError):
         return None

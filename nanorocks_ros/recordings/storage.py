@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.recordings.offered_qos import OfferedQos
 
-# Recordings count signed 64-bit nanoseconds since 1970; any other time stamp is damaged.
-LAST_NS = 2**63 - 1
+# ROS time stamps end on 2038-01-19, with 32 bits of seconds; any later one is damaged, [ns].
+LAST_NS = 2**31 * 10**9 - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -123,6 +123,12 @@ class DashboardSettings:
         'NANOROCKS_DASHBOARD_TOKEN; without it, none on a loopback address, and a random printed '
         'token on others',
     )
+    certificate: str = setting(
+        '', 'PEM file of the certificate chain, to serve the page by HTTPS; empty: by HTTP'
+    )
+    private_key: str = setting(
+        '', 'PEM file of the private key of the certificate; empty: it is in the same file'
+    )
     picture_rate: float = setting(
         8.0, 'largest rate of images of a tray per browser', '1/s', low=0.1, high=30.0
     )

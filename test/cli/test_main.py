@@ -30,3 +30,23 @@ def test_a_system_error_is_one_line_that_names_the_file(monkeypatch, capsys, arg
     assert line == f'nanorocks: {message}free some space, or write elsewhere'
     # Surrogates are escaped, so that any terminal can print the line.
     assert os.fsencode(line) == line.encode('utf-8')
+
+
+def test_a_full_memory_is_one_line_with_a_remedy(monkeypatch, capsys):
+    def full(options):
+        raise MemoryError
+
+    monkeypatch.setattr('nanorocks_ros.cli.recordings.info.run', full)
+    assert command.main(['info', 'bag']) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith('nanorocks: the memory is full; close other programs')
+
+
+@pytest.mark.parametrize('name', ['salvage', 'import'])
+def test_an_output_that_cannot_be_written_is_refused_before_the_input_is_read(
+    tmp_path, capsys, name
+):
+    (tmp_path / 'file').touch()
+    output = tmp_path / 'file' / 'bag'
+    assert command.main([name, str(tmp_path / 'missing'), '-o', str(output)]) == 1
+    assert 'is no folder; write elsewhere' in capsys.readouterr().err

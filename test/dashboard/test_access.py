@@ -84,7 +84,9 @@ def test_only_our_own_page_may_ask(origin, ours):
 def test_after_many_wrong_tokens_even_the_right_one_has_to_wait():
     access = Access('0.0.0.0', TOKEN)
     for k in range(30):
-        assert not access.is_known({'Authorization': f'Bearer guess-number-{k}'}, '')
-    assert access.is_tired
-    assert not access.is_known({'Authorization': f'Bearer {TOKEN}'}, '')
+        assert not access.is_known({'Authorization': f'Bearer guess-number-{k}'}, '', 'outside')
+    assert access.is_locked_out('outside')
+    assert not access.is_known({'Authorization': f'Bearer {TOKEN}'}, '', 'outside')
+    # Nobody else is locked out by that.
+    assert access.is_known({'Authorization': f'Bearer {TOKEN}'}, '', 'inside')
     assert access.is_known({}, access.cookie)

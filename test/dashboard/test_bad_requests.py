@@ -10,6 +10,12 @@ import pytest
 _FORM = b'POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\nContent-Type: '
 
 
+_LIVE = (
+    b'GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+    b'Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n'
+)
+
+
 def answer(server, request):
     with socket.create_connection(('127.0.0.1', server.port), timeout=10) as connection:
         connection.sendall(request)
@@ -24,6 +30,8 @@ def answer(server, request):
         b'\x16\x03\x01\x02\x00\x01\x00\x01\xfc',
         b'GET / HTTP/1.1\r\nHost: localhost\r\nCookie: \x00\r\n\r\n',
         b'POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: abc\r\n\r\n',
+        _LIVE.replace(b'dGhl', b'dG\xff\xfe') + b'\r\n',
+        _LIVE.replace(b'websocket\r', b'web\xba\x92socket\r') + b'\r\n',
         _FORM + b'multipart/form-data\r\n\r\nabcde',
         _FORM + b'multipart/form-data; boundary=x\r\n\r\nabcde',
         _FORM + b'application/x-www-form-urlencoded; charset=nonsense\r\n\r\nabcde',

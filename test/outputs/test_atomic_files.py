@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
@@ -73,3 +75,43 @@ def test_half_a_file_never_takes_its_place(tmp_path, end):
 def test_the_system_says_why_it_cannot_be_written(tmp_path):
     with pytest.raises(RecordingError, match=r'a\.npz: cannot be written \(No such file'):
         write(tmp_path / 'nowhere' / 'a.npz', b'new')
+
+
+def test_the_temporary_name_cannot_be_foreseen_and_a_link_is_not_followed(tmp_path):
+    path, names = tmp_path / 'a.npz', set()
+    for _ in range(3):
+        with atomic_file(path) as part:
+            names.add(part.name)
+            assert part.parent == tmp_path
+            assert part.suffix == '.npz'
+    assert len(names) == 3
+    other = tmp_path / 'other'
+    other.write_bytes(b'kept')
+    path.unlink()
+    path.symlink_to(other)
+    write(path, b'new')
+    assert (path.read_bytes(), other.read_bytes()) == (b'new', b'kept')
+
+
+def test_what_killed_processes_left_is_deleted_once_it_is_old(tmp_path):
+    old, young = tmp_path / '.a.01ab.part.npz', tmp_path / '.a.02cd.part.npz'
+    for file in (old, young, tmp_path / '.b.01ab.part.npz'):
+        file.touch()
+        os.utime(file, (0, 0))
+    os.utime(young)
+    write(tmp_path / 'a.npz', b'new')
+    assert {file.name for file in tmp_path.iterdir()} == {
+        'a.npz', '.a.02cd.part.npz', '.b.01ab.part.npz'
+    }  # fmt: skip
+
+
+def test_results_are_as_readable_as_other_files(tmp_path):
+    write(tmp_path / 'a.npz', b'new')
+    (tmp_path / 'b').touch()
+    assert (tmp_path / 'a.npz').stat().st_mode == (tmp_path / 'b').stat().st_mode
+
+
+def test_a_folder_below_a_file_is_refused_before_the_work(tmp_path):
+    (tmp_path / 'file').touch()
+    with pytest.raises(RecordingError, match='is no folder; write elsewhere'):
+        check_outputs({'--bag': tmp_path / 'file' / 'deep' / 'bag'}, {})

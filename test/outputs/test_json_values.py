@@ -8,7 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from nanorocks_ros.outputs.json_values import finite_or_none, json_values
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.outputs.json_values import (
+    finite_or_none,
+    json_values,
+    parse_object,
+    read_object,
+)
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, np.float32('nan')])
@@ -37,3 +43,20 @@ def test_nested_values_can_be_written_as_strict_json():
         'counts': [0, 1, 2],
         'cycle': {'name': 'NaN', 'beads': 4, 'complete': True, 'error': None, 'size': None},
     }
+
+
+@pytest.mark.parametrize('text', ['', '[1]', '3', '[' * 100_000, '{"a":' * 100_000, '9' * 5000])
+def test_anything_but_an_object_is_a_value_error(tmp_path, text):
+    with pytest.raises(ValueError, match=r'.*'):
+        parse_object(text)
+    (tmp_path / 'x.json').write_text(text)
+    with pytest.raises(ValueError, match=r'.*'):
+        read_object(tmp_path / 'x.json')
+
+
+def test_an_object_is_read_within_the_limit(tmp_path, monkeypatch):
+    (tmp_path / 'x.json').write_text('{"a": [1, null]}')
+    assert read_object(tmp_path / 'x.json') == {'a': [1, None]}
+    monkeypatch.setenv('NANOROCKS_MAX_TEXT_BYTES', '5')
+    with pytest.raises(RecordingError, match='NANOROCKS_MAX_TEXT_BYTES'):
+        read_object(tmp_path / 'x.json')

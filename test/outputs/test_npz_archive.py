@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -45,3 +48,33 @@ def test_a_damaged_byte_is_found_wherever_it_is(tmp_path, bits):
             assert arrays_read['a'].tolist() == [0.0, 1.0, 2.0]
             assert str(arrays_read['b']) == 'text'
     assert refused > len(content) // 2
+
+
+def claiming(path, shape, dtype='<f8', content=b'', compression=zipfile.ZIP_STORED):
+    """An archive with one array whose header claims a shape; its checksums are right."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {'descr': dtype, 'fortran_order': False, 'shape': shape}
+    )
+    with zipfile.ZipFile(path, 'w', compression) as archive:
+        archive.writestr('a.npy', header.getvalue() + content)
+    return path
+
+
+@pytest.mark.parametrize('shape', [(1 << 40,), (1 << 20, 1 << 20), (3, 1 << 61)])
+def test_a_shape_that_the_file_does_not_hold_is_refused_before_memory_is_taken(tmp_path, shape):
+    path = claiming(tmp_path / 'x.npz', shape, content=bytes(80))
+    with pytest.raises(RecordingError, match=r'is damaged, or no \.npz file of arrays'):
+        read_archive(path)
+
+
+def test_arrays_above_the_limit_are_refused_with_the_setting(tmp_path, monkeypatch):
+    monkeypatch.setenv('NANOROCKS_MAX_ARRAY_BYTES', '100000')
+    path = claiming(
+        tmp_path / 'x.npz', (100_000,), content=bytes(800_000), compression=zipfile.ZIP_DEFLATED
+    )
+    assert path.stat().st_size < 2000
+    with pytest.raises(RecordingError, match='NANOROCKS_MAX_ARRAY_BYTES'):
+        read_archive(path)
+    monkeypatch.setenv('NANOROCKS_MAX_ARRAY_BYTES', '1000000')
+    assert read_archive(path)['a'].shape == (100_000,)

@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
     """Calibrate or show, print and write, and return the exit code."""
     from nanorocks_ros.experiment.calibration_file import load_calibration, write_calibration
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.analysis.bag_frames import BagFrames
     from nanorocks_ros.studies.calibration.camera_calibration import (
         calibrate,
@@ -64,6 +65,10 @@ def run(options: argparse.Namespace) -> int:
     )
 
     _check_options(options)
+    names = {'--output': options.output, '--picture': options.picture}
+    files = {flag: Path(name) for flag, name in names.items() if name}
+    # Calibrations are made anew over the old ones, whatever their names end in.
+    check_outputs(files, {flag: (path.suffix,) for flag, path in files.items()}, force=True)
     flown = load_trays(options.trays_file)
     numbers = options.trays or sorted(flown)
     trays = [tray_by_number(flown, number) for number in dict.fromkeys(numbers)]

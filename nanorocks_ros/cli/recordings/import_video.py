@@ -153,8 +153,10 @@ def _run_single(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.studies.film_import.import_film import import_films
 
+    check_new_folder(output.parent)
     with Progress('importing') as progress:
         imported = import_films(paths, output, settings, progress.part)
     _print_notices(imported)
@@ -166,9 +168,11 @@ def _run_each(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.studies.film_import.find_films import find_films
     from nanorocks_ros.studies.film_import.import_each import import_each
 
+    check_new_folder(output)
     with Progress('importing') as progress:
         search = find_films(paths)
         try:

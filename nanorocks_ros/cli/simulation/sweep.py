@@ -92,9 +92,13 @@ def run(options: argparse.Namespace) -> int:
     """Sweep, write and print, and return the exit code."""
     from nanorocks_ros.cli.progress import RunProgress
     from nanorocks_ros.jobs.tasks import Workers
+    from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.sweeps.sweep_runs import sweep
 
     plan = _plan(options)
+    names = {'--csv': options.csv, '--figure': options.figure}
+    files = {flag: Path(name) for flag, name in names.items() if name}
+    check_outputs(files, {flag: (path.suffix,) for flag, path in files.items()}, force=True)
     workers = Workers(
         processes=options.workers,
         scheduler=options.scheduler,

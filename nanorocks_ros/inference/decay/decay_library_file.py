@@ -119,6 +119,9 @@ def _library(arrays: Mapping[str, NDArray[Any]]) -> DecayLibrary:
         raise ValueError('of another release')
     half = arrays[_COVARIANCE]
     n_x = arrays['distances'].size
+    # Before anything is made of the number of distances, which may be any.
+    if half.shape[-1:] != (n_x * (n_x + 1) // 2,) or not _has_numbers(arrays):
+        raise ValueError('of another form')
     upper = np.triu_indices(n_x)
     covariance = np.empty((*half.shape[:-1], n_x, n_x))
     covariance[..., upper[0], upper[1]] = half
@@ -131,6 +134,14 @@ def _library(arrays: Mapping[str, NDArray[Any]]) -> DecayLibrary:
         friction_misfit=float(arrays['friction_misfit']),
         covariance=covariance,
         **{name: arrays[name].astype(np.float64) for name in _ARRAYS},
+    )
+
+
+def _has_numbers(arrays: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether its arrays hold finite real numbers, and its tray is described."""
+    return isinstance(json.loads(str(arrays['tray'])), dict) and all(
+        arrays[name].dtype.kind in 'fiu' and bool(np.isfinite(arrays[name]).all())
+        for name in (*_NUMBERS, *_ARRAYS, _COVARIANCE)
     )
 
 

@@ -5,14 +5,16 @@ Tested by ``test/recordings/bag/test_find_bags.py``.
 
 from __future__ import annotations
 
+import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
-import yaml
-
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.experiment.yaml_limits import load_yaml
+from nanorocks_ros.experiment.yaml_lines import read_text
+from nanorocks_ros.limits import require_regular_file
 from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.recordings.mcap import mcap_blocks
 from nanorocks_ros.recordings.mcap.mcap_file import McapFile
@@ -21,10 +23,9 @@ from nanorocks_ros.recordings.sqlite.sqlite_file import SqliteFile
 from nanorocks_ros.recordings.storage import StorageFile
 
 _KINDS = 'a rosbag2 folder or an .mcap file'
+METADATA = 'metadata.yaml'
 ROS1_MAGIC = b'#ROSBAG V'
 STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
-# The C loader is ten times as fast; PyYAML may be built without it.
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +109,7 @@ def read_metadata(path: str | Path) -> dict[str, str]:
 
 
 def _open_file(path: Path, salvaging: bool) -> StorageFile:
+    require_regular_file(path, RecordingError)
     with path.open('rb') as stream:
         start = stream.read(16)
     if not start:
@@ -147,14 +149,25 @@ def _folder(path: Path, salvaging: bool) -> BagContents:
     _refuse_compressed_files(path, information)
     files = _open_files(path, names, notices, salvaging)
     count = information.get('message_count')
-    information = information or _recorder_notes(files)
+    notes = _recorder_notes(files)
+    if (
+        len(files) == 1
+        and information
+        and notes
+        and _provenance(notes) != _provenance(information)
+    ):
+        notices.append(
+            f'{path / METADATA}: its provenance differs from the copy in {files[0].path.name}; '
+            'the former is used'
+        )
+    information = information or notes
     return BagContents(
         files=tuple(files),
         metadata=_provenance(information),
         compressed_messages=_are_messages_compressed(information),
         notices=tuple(notices),
         complete=len(files) == len(names),
-        expected=count if isinstance(count, int) else None,
+        expected=count if type(count) is int and count >= 0 else None,
     )
 
 
@@ -171,8 +184,8 @@ def _recorder_notes(files: list[StorageFile]) -> dict[str, Any]:
     """Copy of metadata.yaml in the storage files; empty if none has one."""
     for file in files:
         try:
-            notes = yaml.load(file.recorder_notes, Loader=_LOADER)
-        except (yaml.YAMLError, ValueError, RecursionError):
+            notes = load_yaml(str(file.path), file.recorder_notes)
+        except ConfigurationError:
             continue
         if isinstance(notes, dict):
             return notes
@@ -180,17 +193,19 @@ def _recorder_notes(files: list[StorageFile]) -> dict[str, Any]:
 
 
 def _information(path: Path, notices: list[str]) -> dict[str, Any]:
-    file = path / 'metadata.yaml'
-    try:
-        document = yaml.load(file.read_text('utf-8'), Loader=_LOADER)
-        information = document['rosbag2_bagfile_information']
-        return dict(information)
-    except FileNotFoundError:
+    file = path / METADATA
+    if not os.path.lexists(file):
         notices.append(
             f'{path}: has no metadata.yaml, as after a crash; the bag is read without it'
         )
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError):
+        return {}
+    try:
+        document = load_yaml(str(file), read_text(file, 'a rosbag2 folder'))
+        return dict(document['rosbag2_bagfile_information'])
+    except (KeyError, TypeError, ValueError):
         notices.append(f'{file}: cannot be parsed; the bag is read without it')
+    except ConfigurationError as error:
+        notices.append(f'{file}: cannot be parsed ({error.what}); the bag is read without it')
     return {}
 
 
@@ -198,6 +213,8 @@ def _names(path: Path, information: dict[str, Any]) -> list[str]:
     listed = information.get('relative_file_paths')
     # Early versions of rosbag2 listed paths that start with the folder.
     names = [PurePath(str(name)).name for name in listed] if isinstance(listed, list) else []
+    # A file that is listed twice is one file.
+    names = list(dict.fromkeys(names))
     if any((path / name).is_file() for name in names):
         return names
     present = (p.name for p in path.iterdir() if p.suffix in STORAGE_SUFFIXES and p.is_file())

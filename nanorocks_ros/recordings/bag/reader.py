@@ -12,6 +12,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import CHUNK_BYTES
 from nanorocks_ros.recordings.bag.bag_folder import BagContents, open_contents
 from nanorocks_ros.recordings.bag.provenance import Interruption, interruptions
 from nanorocks_ros.recordings.messages.message_types import register_type, standard_types
@@ -32,8 +33,6 @@ _DESERIALIZE_ERRORS = (
     AssertionError,
     MemoryError,
 )
-# Largest size of a decompressed message, [bytes]; an uncompressed 4K frame has 25 MB.
-_MESSAGE_LIMIT = 2**30
 
 
 def open_bag(path: str | Path, *, salvaging: bool = False) -> BagReader:
@@ -107,8 +106,22 @@ class BagReader:
             all(file.complete for file in self._contents.files)
             and self._contents.complete
             and not self._undecompressed
+            and not self._miscount
             and not self.interruptions
         )
+
+    @property
+    def _miscount(self) -> str:
+        """How the count in ``metadata.yaml`` differs from that of the files; empty if it agrees.
+
+        Where messages were found to be lost, that is told already.
+        """
+        present = sum(map(_count, self._contents.files))
+        if self.expected is None or present + self.messages_lost == self.expected:
+            return ''
+        if self.messages_lost and present <= self.expected <= present + self.messages_lost:
+            return ''
+        return f'metadata.yaml counts {self.expected} messages, the files hold {present}'
 
     @property
     def interruptions(self) -> tuple[Interruption, ...]:
@@ -127,6 +140,8 @@ class BagReader:
         notices = [*self._contents.notices]
         for file in self._contents.files:
             notices += file.notices
+        if self._miscount:
+            notices.append(f'{self.path}: {self._miscount}')
         if self._undecompressed:
             notices.append(
                 f'{self.path}: {self._undecompressed} messages could not be decompressed'
@@ -165,7 +180,7 @@ class BagReader:
         self._undecompressed = 0
         for message in messages:
             try:
-                cdr = zstandard.decompress(message.cdr, max_output_size=_MESSAGE_LIMIT)
+                cdr = zstandard.decompress(message.cdr, max_output_size=CHUNK_BYTES.value)
             except (zstandard.ZstdError, MemoryError):
                 self._undecompressed += 1
                 continue

@@ -23,6 +23,7 @@ from rosbags.serde import SerdeError
 
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.recordings.bag.connections import add_connection
+from nanorocks_ros.recordings.mcap.mcap_checksum import add_summary_checksum
 from nanorocks_ros.recordings.messages.message_types import standard_types
 from nanorocks_ros.records import NS
 
@@ -116,6 +117,7 @@ class BagWriter:
     ) -> Literal[False]:
         try:
             self._writer.close()
+            add_summary_checksum(self._storage.path)
         except OSError as failure:
             with suppress(OSError):
                 self._writer.abort()

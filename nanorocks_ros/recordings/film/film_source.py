@@ -147,10 +147,16 @@ class Film(Protocol):
     info : FilmInfo
     damaged : int
         Number of unusable frames so far.
+    losses : tuple of str
+        What is missing of it, in sentences; final once its frames have been read.
     """
 
     info: FilmInfo
     damaged: int
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """What is missing of the film, in sentences."""
 
     def frames(self) -> Iterator[FilmFrame]:
         """Usable frames in the order of the film."""

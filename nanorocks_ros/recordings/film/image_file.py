@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
+from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import IMAGE_PIXELS, is_too_large, require_regular_file
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
@@ -69,9 +72,14 @@ def _max_value(file: Path) -> int | None:
 
 
 def _decoded(file: Path, flags: int) -> NDArray[Any] | None:
+    require_regular_file(file, RecordingError)
     try:
         content = np.fromfile(file, np.uint8)
         image = cv2.imdecode(content, flags) if content.size else None
-    except (OSError, cv2.error):
+    except OSError:
+        return None
+    except cv2.error as error:
+        if is_too_large(error):
+            raise IMAGE_PIXELS.exceeded(None, RecordingError, str(file)) from error
         return None
     return None if image is None else np.asarray(image)

@@ -95,6 +95,9 @@ class ImageFolder:
         If there are no images, or none can be decoded.
     """
 
+    # Gaps in the numbers of its files are told before it is read.
+    losses: tuple[str, ...] = ()
+
     def __init__(self, path: Path, rate: Fraction | None = None) -> None:
         self.damaged = 0
         files = images_in(path)

@@ -10,7 +10,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import IMAGE_PIXELS, require_regular_file
 from nanorocks_ros.recordings.film.display_rotation import UNROTATED, rotation_of, rotation_text
+from nanorocks_ros.recordings.film.film_losses import FilmLosses, stated_duration
 from nanorocks_ros.recordings.film.film_source import (
     EncodedImage,
     FilmFrame,
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 
 # A playlist must not make FFmpeg fetch anything from the network.
 _ONLY_FILES = {'protocol_whitelist': 'file,crypto,data'}
+_STRICT = {'err_detect': 'explode'}
 _CAMERA_TAGS = ('make', 'model', 'comment', 'encoder', 'location')
 
 
@@ -66,7 +69,9 @@ class Video:
     """
 
     def __init__(self, path: Path, rate: Fraction | None = None, threads: int = 0) -> None:
+        require_regular_file(path, RecordingError)
         self.damaged = 0
+        self._losses = FilmLosses(0, 0.0)
         self._threads = threads
         self._av = pyav(str(path))
         self._bytes = path.stat().st_size
@@ -77,6 +82,10 @@ class Video:
         # Opened again because the selection may have read packets.
         with self._opened(path) as container:
             stream = container.streams.video[self._stream_index]
+            if stream.codec_context is None:
+                raise RecordingError(
+                    str(path), 'is in a format that cannot be decoded', 'pass another video'
+                )
             declared = None if rate else declared_rate(path, container, stream)
             self._rate = rate or declared
             self.info = self._film_info(path, container, stream)
@@ -130,6 +139,8 @@ class Video:
 
     def _first_frame(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
         """The first frame that can be decoded, and the packet that completed it."""
+        context = stream.codec_context
+        IMAGE_PIXELS.check(context.width * context.height, str(path))
         packets = container.demux(stream)
         while True:
             try:
@@ -166,6 +177,11 @@ class Video:
             changes.append(f'{rotation_text(self._rotation)} according to its rotation flag')
         return tuple(f'{info.path}: {change}{recompressed}' for change in changes)
 
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """What is missing of the film, in sentences; final once its frames have been read."""
+        return tuple(self._losses.sentences())
+
     def frames(self) -> Iterator[FilmFrame]:
         """Usable frames in the order of the film.
 
@@ -175,6 +191,7 @@ class Video:
         """
         with self._opened(self.info.path) as container:
             stream = container.streams.video[self._stream_index]
+            self._losses = FilmLosses(self.info.expected, stated_duration(container, stream))
             for number, frame in enumerate(self._stored_or_decoded_frames(container, stream)):
                 if self._rate is None:
                     yield frame
@@ -187,6 +204,8 @@ class Video:
             return self._stored_frames(container, stream)
         stream.thread_type = 'AUTO'
         stream.codec_context.thread_count = self._threads
+        # Otherwise the decoder fills what it cannot decode with parts of other frames.
+        stream.codec_context.options = dict(_STRICT)
         return self._decoded_frames(container, stream)
 
     def _stored_frames(self, container: Any, stream: Any) -> Iterator[FilmFrame]:
@@ -238,6 +257,9 @@ class Video:
                 return
             if packet is None:
                 return
+            # Those that are not shown and repeats without content are stated, too.
+            if packet.size or packet.dts is not None:
+                self._losses.note(_shown_ns(packet, stream))
             if packet.pos is not None and self._bytes:
                 done = min(1.0, max(done, packet.pos / self._bytes))
             yield packet, done

@@ -9,18 +9,24 @@ Tested by ``test/recordings/bag/test_find_bags.py``.
 from __future__ import annotations
 
 import struct
-import zlib
+from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-import lz4.frame
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Schema
+
+from nanorocks_ros.limits import CHUNK_BYTES, CHUNK_MESSAGES
+from nanorocks_ros.recordings.mcap.mcap_catalogue import Catalogue
+from nanorocks_ros.recordings.mcap.mcap_chunks import (
+    FRAME_STARTS,
+    UNREADABLE,
+    ChecksumError,
+    DamagedError,
+    TooLargeError,
+    stored_chunk,
+    unpacked,
+    unpacked_prefix,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,30 +34,12 @@ if TYPE_CHECKING:
 
 MAGIC = b'\x89MCAP0\r\n'
 RECORD = struct.Struct('<BQ')
-_MESSAGE = struct.Struct('<HIQQ')
+MESSAGE_HEAD = struct.Struct('<HIQQ')
 _INDEX_OF_CHANNEL = struct.Struct('<HI')
 _INDEX_ENTRY_BYTES = 16
-_FRAME_STARTS = {'zstd': b'\x28\xb5\x2f\xfd', 'lz4': b'\x04\x22\x4d\x18'}
-# Channels and schemas are at the front of a chunk. Damaged data is decompressed in pieces.
-_CATALOGUE_BYTES, _PIECE_BYTES, _CHECKSUM_BYTES = 1 << 21, 1 << 12, 4
-# Largest size of a decompressed chunk, [bytes], in case a bit of the size is flipped; common
-# writers stay below 16 MB.
-_CHUNK_LIMIT = 2**31
-
-UNREADABLE = (
-    McapError,
-    struct.error,
-    ValueError,
-    OverflowError,
-    RuntimeError,
-    zstandard.ZstdError,
-    MemoryError,
-)
-"""Exceptions of the `mcap` library and the decompressors for damaged data."""
-
-
-class DamagedError(ValueError):
-    """A part of a file cannot be read."""
+# Channels and schemas are at the front of a chunk.
+_CATALOGUE_BYTES = 1 << 21
+_IN_CHUNKS = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
 
 
 class StoredMessage(NamedTuple):
@@ -68,29 +56,6 @@ class StoredMessage(NamedTuple):
     channel: int
     log_time_ns: int
     data: memoryview
-
-
-class Catalogue:
-    """Channels and schemas read so far, by their ids.
-
-    Attributes
-    ----------
-    channels : dict of int to mcap.records.Channel
-    schemas : dict of int to mcap.records.Schema
-    """
-
-    def __init__(self) -> None:
-        self.channels: dict[int, Channel] = {}
-        self.schemas: dict[int, Schema] = {}
-
-    def add(self, opcode: int, content: memoryview) -> None:
-        """Add a record if it is a channel or a schema."""
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(data_stream(content))
-            self.schemas.setdefault(schema.id, schema)
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(data_stream(content))
-            self.channels.setdefault(channel.id, channel)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +75,12 @@ class Block:
     cut : bool
         Whether it is an incomplete chunk at the end of a truncated file; its readable part is
         used.
+    chunk : bool
+        Whether it is one chunk; otherwise records outside chunks.
+    indexed : bool
+        Whether the index of the file says so; then its head must say the same.
+    unverified : bool
+        Whether its content is used although it differs from its checksum.
     """
 
     offset: int
@@ -119,11 +90,9 @@ class Block:
     channels: frozenset[int] | None
     indexed_bytes: int = 0
     cut: bool = False
-
-
-def data_stream(content: memoryview | bytes) -> ReadDataStream:
-    """Content of one record as a stream for the `mcap` library."""
-    return ReadDataStream(BytesIO(content))
+    chunk: bool = False
+    indexed: bool = False
+    unverified: bool = False
 
 
 def iterate_records(data: memoryview, *, cut: bool = False) -> Iterator[tuple[int, memoryview]]:
@@ -152,67 +121,39 @@ def iterate_records(data: memoryview, *, cut: bool = False) -> Iterator[tuple[in
         raise DamagedError('records do not add up')
 
 
-def _decompressed(chunk: Chunk) -> bytes:
-    if chunk.uncompressed_size > _CHUNK_LIMIT:
-        raise DamagedError(f'chunk of {chunk.uncompressed_size} bytes')
-    if chunk.compression == 'zstd':
-        size = zstandard.get_frame_parameters(chunk.data).content_size
-        if size not in (chunk.uncompressed_size, zstandard.CONTENTSIZE_UNKNOWN):
-            raise DamagedError('size of a chunk differs from its header')
-        return zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size)
-    if chunk.compression == 'lz4':
-        return bytes(lz4.frame.decompress(chunk.data))
-    if chunk.compression:
-        raise DamagedError(f'unknown compression {chunk.compression!r}')
-    return chunk.data
-
-
-def _decompressed_prefix(data: bytes, compression: str) -> bytes:
-    """Decompress truncated or damaged data as far as possible."""
-    if not compression:
-        return data
-    decompressor = (
-        zstandard.ZstdDecompressor().decompressobj()
-        if compression == 'zstd'
-        else lz4.frame.LZ4FrameDecompressor()
-    )
-    content = bytearray()
-    # The checksum is a separate piece: if it is wrong, the data before it is still returned.
-    starts = [*range(0, len(data) - _CHECKSUM_BYTES, _PIECE_BYTES), len(data) - _CHECKSUM_BYTES]
-    try:
-        for start, end in pairwise([*starts, len(data)]):
-            content += decompressor.decompress(data[max(0, start) : end])
-    except (*UNREADABLE, EOFError):
-        pass
-    return bytes(content)
-
-
-def _chunk_records(content: memoryview) -> memoryview:
-    chunk = Chunk.read(data_stream(content))
-    data = _decompressed(chunk)
-    if len(data) != chunk.uncompressed_size:
-        raise DamagedError('size of a chunk differs from its header')
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise DamagedError('checksum of a chunk is wrong')
-    return memoryview(data)
-
-
 def _message(content: memoryview) -> StoredMessage:
-    channel, _, log_time_ns, _ = _MESSAGE.unpack_from(content)
-    return StoredMessage(channel, log_time_ns, content[_MESSAGE.size :])
+    channel, _, log_time_ns, _ = MESSAGE_HEAD.unpack_from(content)
+    return StoredMessage(channel, log_time_ns, content[MESSAGE_HEAD.size :])
 
 
 def _collect(
     data: memoryview, catalogue: Catalogue, messages: list[StoredMessage], *, cut: bool
 ) -> None:
     """Append the messages in the data to a list, and add channels and schemas to a catalogue."""
+    most = CHUNK_MESSAGES.value
     for opcode, content in iterate_records(data, cut=cut):
         if opcode == Opcode.MESSAGE:
             messages.append(_message(content))
-        elif opcode == Opcode.CHUNK:
-            _collect(_chunk_records(content), catalogue, messages, cut=False)
-        else:
+            if len(messages) > most:
+                raise TooLargeError(CHUNK_MESSAGES)
+        elif opcode in _IN_CHUNKS:
             catalogue.add(opcode, content)
+        else:
+            raise DamagedError(f'a record of kind {opcode} where a message must stand')
+
+
+def _collect_readable(
+    data: memoryview, catalogue: Catalogue, messages: list[StoredMessage]
+) -> None:
+    """As `_collect`, without records that cannot be read or are of another kind."""
+    for opcode, content in iterate_records(data, cut=True):
+        with suppress(*UNREADABLE):
+            if opcode == Opcode.MESSAGE:
+                messages.append(_message(content))
+            else:
+                catalogue.add(opcode, content)
+        if len(messages) > CHUNK_MESSAGES.value:
+            raise TooLargeError(CHUNK_MESSAGES)
 
 
 def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMessage]:
@@ -232,23 +173,53 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
 
     Raises
     ------
+    ChecksumError
+        If only its checksum is wrong.
     DamagedError
         If any part of the block is damaged.
     """
+    if block.length > CHUNK_BYTES.value:
+        raise TooLargeError(CHUNK_BYTES)
     stream.seek(block.offset)
     raw = memoryview(stream.read(block.length))
     messages: list[StoredMessage] = []
     try:
-        if block.cut:
-            chunk = Chunk.read(data_stream(raw[RECORD.size :]))
-            data = _decompressed_prefix(chunk.data, chunk.compression)
-            _collect(memoryview(data), catalogue, messages, cut=True)
+        if block.chunk:
+            data = memoryview(_records_of_chunk(raw, block))
+            if block.unverified:
+                _collect_readable(data, catalogue, messages)
+            else:
+                _collect(data, catalogue, messages, cut=block.cut)
         else:
             _collect(raw, catalogue, messages, cut=False)
+    except ChecksumError:
+        raise
     except UNREADABLE as error:
         _recover_catalogue(bytes(raw), catalogue)
         raise DamagedError(str(error)) from error
+    if block.indexed and not _are_in_range(messages, block):
+        raise DamagedError('the index leads to another chunk')
     return messages
+
+
+def _records_of_chunk(raw: memoryview, block: Block) -> bytes:
+    if block.indexed:
+        opcode, length = RECORD.unpack_from(raw)
+        if opcode != Opcode.CHUNK or RECORD.size + length != block.length:
+            raise DamagedError('the index leads to no chunk')
+    chunk = stored_chunk(raw[RECORD.size :])
+    if block.cut:
+        return unpacked_prefix(bytes(chunk.packed), chunk.compression)
+    try:
+        return unpacked(chunk)
+    except ChecksumError as error:
+        if block.unverified:
+            return error.data
+        raise
+
+
+def _are_in_range(messages: list[StoredMessage], block: Block) -> bool:
+    return all(block.start_ns <= message.log_time_ns <= block.end_ns for message in messages)
 
 
 def recover_catalogue(stream: BinaryIO, start: int, end: int, catalogue: Catalogue) -> None:
@@ -267,11 +238,11 @@ def recover_catalogue(stream: BinaryIO, start: int, end: int, catalogue: Catalog
 
 
 def _recover_catalogue(raw: bytes, catalogue: Catalogue) -> None:
-    for compression, magic in _FRAME_STARTS.items():
+    for compression, magic in FRAME_STARTS.items():
         offset = raw.find(magic)
         if offset < 0:
             continue
-        data = _decompressed_prefix(raw[offset : offset + _CATALOGUE_BYTES], compression)
+        data = unpacked_prefix(raw[offset : offset + _CATALOGUE_BYTES], compression)
         try:
             for opcode, content in iterate_records(memoryview(data), cut=True):
                 catalogue.add(opcode, content)
@@ -279,19 +250,28 @@ def _recover_catalogue(raw: bytes, catalogue: Catalogue) -> None:
             return
 
 
-def indexed_messages(content: memoryview) -> int:
-    """Number of messages that a message index lists."""
-    _, length = _INDEX_OF_CHANNEL.unpack_from(content)
-    return int(length) // _INDEX_ENTRY_BYTES
-
-
-def indexed_count_after(stream: BinaryIO, block: Block) -> int:
-    """Number of messages in the message indexes behind a block; 0 if they cannot be read."""
-    stream.seek(block.offset + block.length)
-    raw = memoryview(stream.read(block.indexed_bytes))
+def indexed_count_at(stream: BinaryIO, start: int, end: int) -> int:
+    """Number of messages that the message index at these offsets lists."""
+    stream.seek(start + RECORD.size)
     try:
-        return sum(
-            indexed_messages(c) for op, c in iterate_records(raw) if op == Opcode.MESSAGE_INDEX
-        )
-    except UNREADABLE:
+        _, length = _INDEX_OF_CHANNEL.unpack(stream.read(_INDEX_OF_CHANNEL.size))
+    except struct.error:
         return 0
+    return min(int(length), end - start) // _INDEX_ENTRY_BYTES
+
+
+def indexed_count_after(stream: BinaryIO, block: Block) -> int | None:
+    """Number of messages in the message indexes behind a block; None if they cannot be read."""
+    position = block.offset + block.length
+    end, count = position + block.indexed_bytes, 0
+    while position < end:
+        stream.seek(position)
+        raw = stream.read(RECORD.size)
+        if len(raw) < RECORD.size:
+            return None
+        opcode, length = RECORD.unpack(raw)
+        if opcode != Opcode.MESSAGE_INDEX or position + RECORD.size + length > end:
+            return None
+        count += indexed_count_at(stream, position, position + RECORD.size + length)
+        position += RECORD.size + length
+    return count

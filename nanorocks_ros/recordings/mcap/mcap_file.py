@@ -12,12 +12,13 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.mcap.mcap_blocks import (
     MAGIC,
     Block,
-    DamagedError,
     StoredMessage,
     indexed_count_after,
     load,
 )
+from nanorocks_ros.recordings.mcap.mcap_chunks import DamagedError, TooLargeError
 from nanorocks_ros.recordings.mcap.mcap_index import McapIndex, read_index, recorder_notes
+from nanorocks_ros.recordings.mcap.mcap_notices import damage_notices
 from nanorocks_ros.recordings.mcap.mcap_scan import scan
 from nanorocks_ros.recordings.offered_qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
@@ -60,8 +61,9 @@ class McapFile:
         with path.open('rb') as stream:
             size = stream.seek(0, 2)
             start, self._has_magic = self._read_magic(stream, size, salvaging)
-            index = read_index(stream, size)
-            self._index: McapIndex = index or scan(stream, size)
+            # A salvage does not trust the index, which may lead nowhere or past messages.
+            index = None if salvaging else read_index(stream, size)
+            self._index: McapIndex = index or scan(stream, size, salvaging=salvaging)
             if not (self._has_magic or self._index.ended or self._index.blocks):
                 raise self._not_mcap_error(start)
             self.recorder_notes = recorder_notes(stream, self._index)
@@ -90,33 +92,22 @@ class McapFile:
     @property
     def complete(self) -> bool:
         """Whether no data loss has been found so far."""
-        return self._index.ended and not self._index.lost and not self._index.invalid_times
+        return self._index.intact
 
     @property
     def messages_lost(self) -> int:
         """Number of lost messages found so far; those behind a truncation are not known."""
-        return sum(self._index.lost.values()) + sum(self._index.invalid_times.values())
+        return self._index.known_losses + max(0, self._index.miscount)
 
     @property
     def notices(self) -> tuple[str, ...]:
         """Damage and recovery found so far, in sentences."""
-        notices = []
-        if not self._has_magic:
-            notices.append(f'{self.path}: its first bytes are damaged; the rest is read')
+        notices = damage_notices(self._index)
         if not self._index.ended:
-            notices.append(f'{self.path}: {self._truncation_text()}')
-        if self._index.lost:
-            blocks, lost = len(self._index.lost), sum(self._index.lost.values())
-            notices.append(
-                f'{self.path}: {blocks} damaged {"block was" if blocks == 1 else "blocks were"} '
-                f'skipped, at least {lost} messages are lost'
-            )
-        if self._index.invalid_times:
-            count = sum(self._index.invalid_times.values())
-            notices.append(
-                f'{self.path}: {count} messages with impossible time stamps were skipped'
-            )
-        return tuple(notices)
+            notices.insert(0, self._truncation_text())
+        if not self._has_magic:
+            notices.insert(0, 'its first bytes are damaged; the rest is read')
+        return tuple(f'{self.path}: {notice}' for notice in notices)
 
     def _truncation_text(self) -> str:
         seconds = (self.end_ns - self.start_ns) / NS
@@ -178,16 +169,31 @@ class McapFile:
         return record is not None and (wanted is None or record.topic in wanted)
 
     def _load(self, stream: BinaryIO, block: Block) -> list[StoredMessage]:
+        index = self._index
         try:
-            messages = load(stream, block, self._index.catalogue)
-        except DamagedError:
-            self._index.lost[block.offset] = indexed_count_after(stream, block)
+            messages = load(stream, block, index.catalogue)
+        except DamagedError as error:
+            if isinstance(error, TooLargeError):
+                index.refusals.add(str(error))
+            index.lost[block.offset] = indexed_count_after(stream, block) or 0
+            index.read[block.offset] = 0
             return []
-        messages = self._index.with_valid_times(block.offset, messages)
-        orphans = sum(m.channel not in self._index.catalogue.channels for m in messages)
+        if block.indexed_bytes:
+            self._compare_with_index(stream, block, len(messages))
+        messages = index.with_valid_times(block.offset, messages)
+        orphans = sum(m.channel not in index.catalogue.channels for m in messages)
         if orphans:
-            self._index.lost[block.offset] = orphans
+            index.lost[block.offset] = orphans
+        index.read[block.offset] = len(messages) - orphans
         return messages
+
+    def _compare_with_index(self, stream: BinaryIO, block: Block, count: int) -> None:
+        """Count messages that the message indexes list and that a readable chunk lacks."""
+        indexed = indexed_count_after(stream, block)
+        if indexed is not None and indexed > count:
+            self._index.lost[block.offset] = indexed - count
+        elif indexed != count:
+            self._index.disagreements.add(block.offset)
 
     def _message(self, message: StoredMessage) -> BagMessage:
         topic = self._index.catalogue.channels[message.channel].topic

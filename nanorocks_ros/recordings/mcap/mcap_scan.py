@@ -1,47 +1,43 @@
 """Build the index of an MCAP file that has none, by scanning the file.
 
-Tested by ``test/recordings/bag/test_reader.py``.
+The scan trusts no length alone: a record counts if its fields fill it, a chunk if it can be
+unpacked. Behind anything else it looks for the next place where sound records begin, so an intact
+chunk behind missing or inserted bytes is read.
+
+Tested by ``test/recordings/mcap/test_mcap_scan.py``.
 """
 
 from __future__ import annotations
 
-import re
-import struct
 from typing import TYPE_CHECKING
 
 from mcap.opcode import Opcode
 
 from nanorocks_ros.recordings.mcap.mcap_blocks import (
     MAGIC,
-    RECORD,
-    UNREADABLE,
     Block,
-    DamagedError,
-    indexed_messages,
-    iterate_records,
+    indexed_count_at,
     load,
     recover_catalogue,
 )
-from nanorocks_ros.recordings.mcap.mcap_index import McapIndex
+from nanorocks_ros.recordings.mcap.mcap_checksum import is_data_intact
+from nanorocks_ros.recordings.mcap.mcap_chunks import DamagedError, TooLargeError
+from nanorocks_ros.recordings.mcap.mcap_heads import (
+    FIRST_PRIVATE,
+    ChunkExtent,
+    Head,
+    chunk_extent,
+    read_head,
+)
+from nanorocks_ros.recordings.mcap.mcap_index import McapIndex, add_summary
+from nanorocks_ros.recordings.mcap.mcap_resync import is_record, next_record, records_follow
 
 if TYPE_CHECKING:
     from typing import BinaryIO
 
 # Messages outside chunks are joined to runs of about this size.
 _RUN_BYTES = 1 << 20
-_LAST_OPCODE = 0x0F
-_FIRST_PRIVATE_OPCODE = 0x80
-# Start of a chunk or message index that is shorter than 4 GB. Starts of messages are searched
-# only in files with messages outside of chunks; compressed data may contain such bytes by chance.
-_CHUNK_START = re.compile(rb'[\x06\x07][\s\S]{4}\x00{4}')
-_MESSAGE_START = re.compile(rb'[\x05\x06\x07][\s\S]{4}\x00{4}')
-# Consecutive plausible records needed to continue behind a damage.
-_IN_A_ROW = 3
-# Largest part of the summary section that is read.
-_SUMMARY_BYTES = 1 << 26
-# Header of a chunk: times, size, checksum, and length of the name of its compression.
-_CHUNK_HEAD = struct.Struct('<QQQII')
-_LONGEST_NAME = 16
+_OF_A_RUN = (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL)
 # Records that end the data section.
 _END_OF_DATA = (Opcode.DATA_END, Opcode.FOOTER)
 
@@ -49,181 +45,250 @@ _END_OF_DATA = (Opcode.DATA_END, Opcode.FOOTER)
 class _Scanner:
     """Scan a file from its beginning, as far as it can be read."""
 
-    def __init__(self, stream: BinaryIO, size: int) -> None:
+    def __init__(self, stream: BinaryIO, size: int, *, salvaging: bool) -> None:
         self._stream = stream
         self._size = size
-        self._run: tuple[int, int] | None = None
+        self._salvaging = salvaging
+        # Records that were joined to a run: where the first and the last begin, and its end.
+        self._run: tuple[int, int, int] | None = None
+        # The damage that the message indexes behind it may count, and messages read behind it.
         self._damaged: int | None = None
-        # Messages that were read and that the message indexes have not counted yet.
-        self._uncounted = 0
-        # Whether the file has messages outside of chunks.
-        self._unchunked = False
-        self.index = McapIndex()
+        self._indexed = self._recovered = 0
+        # Whether the messages behind it belong to a chunk whose checksum is wrong.
+        self._descended = False
+        self._boundary = 0
+        # From where a record that is no message was looked for last, and where it is.
+        self._telling: tuple[int, int | None] = (size, None)
+        # Kinds of records on the top level so far.
+        self._chunked = self._unchunked = self._packed = False
+        self._at_end_of_data = False
+        self.index = McapIndex(scanned=True)
 
     def run(self) -> None:
         position = len(MAGIC)
-        while position + RECORD.size <= self._size:
-            self._stream.seek(position)
-            opcode, length = RECORD.unpack(self._stream.read(RECORD.size))
-            end = position + RECORD.size + length
-            if not _plausible(opcode) or end > self._size:
-                next_record = self._next_record(position, opcode, length)
-                if next_record is None:
-                    break
+        while (head := read_head(self._stream, position, self._size)) is not None:
+            following = self._step(head)
+            if following is None:
+                break
+            position = following
+            if self._at_end_of_data:
                 self._end_run()
-                self._damaged = position
-                self.index.lost[position] = 0
-                recover_catalogue(self._stream, position, next_record, self.index.catalogue)
-                position = next_record
-                continue
-            if opcode in _END_OF_DATA:
-                self._end_run()
+                self._settle_damage()
                 self.index.ended = self._has_footer()
-                self._read_summary(end)
+                add_summary(self.index, self._stream, head.end)
                 return
-            self._handle_record(opcode, position, end)
-            position = end
         self._end_run()
+        self._settle_damage()
         self._note_truncation(min(position, self._size))
 
-    def _next_record(self, position: int, opcode: int, length: int) -> int | None:
-        """Offset of the next intact record behind a damaged one; None if there is none."""
-        if opcode == Opcode.CHUNK and self._is_truncated_chunk(position, length):
-            return None
-        starts = _MESSAGE_START if self._unchunked and opcode != Opcode.CHUNK else _CHUNK_START
-        window = position + 1
-        while window < self._size:
-            self._stream.seek(window)
-            data = self._stream.read(_RUN_BYTES)
-            for match in starts.finditer(data):
-                if self._records_follow(window + match.start()):
-                    return window + match.start()
-            window += max(1, len(data) - RECORD.size)
-        return None
+    def _step(self, head: Head) -> int | None:
+        """Handle a record; where the next begins, None at the end of what can be read."""
+        if self._may_be_chunk(head):
+            extent = chunk_extent(self._stream, head)
+            if extent is not None:
+                return self._step_chunk(head, extent)
+        if is_record(self._stream, head, self._size):
+            self._handle_record(head)
+            return head.end
+        if head.opcode >= FIRST_PRIVATE and records_follow(self._stream, head.end, self._size):
+            self._end_run()
+            self.index.unknown_records += 1
+            return head.end
+        return self._skip(head.start)
 
-    def _is_truncated_chunk(self, position: int, length: int) -> bool:
-        """Whether the lengths in a chunk header agree, so that the file ends inside the chunk."""
-        self._stream.seek(position + RECORD.size)
-        head = self._stream.read(_CHUNK_HEAD.size + _LONGEST_NAME)
-        if len(head) < _CHUNK_HEAD.size + _LONGEST_NAME:
+    def _may_be_chunk(self, head: Head) -> bool:
+        """Whether it is worth to look for a chunk here, whatever the opcode says."""
+        if head.opcode == Opcode.CHUNK:
             return True
-        name = int(_CHUNK_HEAD.unpack_from(head)[-1])
-        if name > _LONGEST_NAME - 8:
-            return False
-        (records,) = struct.unpack_from('<Q', head, _CHUNK_HEAD.size + name)
-        return bool(_CHUNK_HEAD.size + name + 8 + records == length)
+        return not (self._unchunked or is_record(self._stream, head, self._size))
 
-    def _records_follow(self, position: int) -> bool:
-        """Whether several plausible records follow from this offset."""
-        for _ in range(_IN_A_ROW):
-            if position + RECORD.size > self._size:
-                return False
-            self._stream.seek(position)
-            opcode, length = RECORD.unpack(self._stream.read(RECORD.size))
-            position += RECORD.size + length
-            if not 0 < opcode <= _LAST_OPCODE or position > self._size:
-                return False
-        return True
+    # --- chunks ------------------------------------------------------------------------------
+
+    def _step_chunk(self, head: Head, extent: ChunkExtent) -> int | None:
+        self._end_run()
+        self._settle_damage()
+        self._chunked = True
+        self._packed = self._packed or extent.compressed
+        readable = [end for end in extent.ends if end <= self._size]
+        if not readable:
+            return self._step_cut_chunk(head)
+        damaged_head = head.opcode != Opcode.CHUNK or len(extent.ends) > 1
+        for end in readable:
+            if self._add_block(head.start, end, chunk=True):
+                if damaged_head:
+                    self.index.repaired.add(head.start)
+                return end
+        if self._salvaging and not extent.compressed:
+            # Its records are read one by one; their checksum is known to be wrong, or unknown.
+            self._mark_damage(head.start)
+            self._descended = True
+            self._boundary = readable[0]
+            return extent.content
+        return self._leave_damaged_chunk(head, readable)
+
+    def _leave_damaged_chunk(self, head: Head, ends: list[int]) -> int | None:
+        """Continue behind a damaged chunk, whose length counts only if records follow."""
+        end = next((e for e in ends if records_follow(self._stream, e, self._size)), None)
+        if end is None:
+            return self._skip(head.start)
+        self._mark_damage(head.start)
+        if self._salvaging:
+            self._recovered = self._add_block(head.start, end, chunk=True, unverified=True)
+            self._descended = self._recovered > 0
+        return end
+
+    def _step_cut_chunk(self, head: Head) -> int | None:
+        """A chunk that ends behind the file: the file was cut, or bytes are missing in it."""
+        following = self._next_record(head.start)
+        if following is not None:
+            self._mark_damage(head.start)
+        return following
+
+    # --- records -----------------------------------------------------------------------------
+
+    def _handle_record(self, head: Head) -> None:
+        self._at_end_of_data = head.opcode in _END_OF_DATA
+        if head.opcode == Opcode.DATA_END and self._unchunked:
+            self.index.wrong_checksum = not is_data_intact(self._stream, head.start)
+        if head.opcode == Opcode.MESSAGE_INDEX:
+            self._end_run()
+            if self._damaged is not None:
+                self._indexed += indexed_count_at(self._stream, head.start, head.end)
+            return
+        if head.opcode == Opcode.MESSAGE and self._damaged is None:
+            self._unchunked = True
+        if head.opcode in _OF_A_RUN:
+            start = self._run[0] if self._run else head.start
+            self._run = (start, head.start, head.end)
+            if head.end - start >= _RUN_BYTES:
+                self._end_run()
+            return
+        self._end_run()
+
+    def _end_run(self) -> None:
+        if self._run is not None:
+            (start, _, end), self._run = self._run, None
+            self._add_block(start, end, chunk=False)
+
+    # --- damage ------------------------------------------------------------------------------
+
+    def _skip(self, position: int) -> int | None:
+        """Leave out damaged bytes; where sound records begin again, None if nowhere."""
+        suspect = self._run[1] if self._run else position
+        following = self._next_record(suspect)
+        if following is None:
+            return None
+        if self._run and following < position:
+            # The length of the last record of the run is wrong: it holds the next ones.
+            start, last, _ = self._run
+            self._run = (start, last, last) if last > start else None
+            position = last
+        self._end_run()
+        if not self._descended:
+            self._mark_damage(position)
+        recover_catalogue(self._stream, position, following, self.index.catalogue)
+        return following
+
+    def _next_record(self, position: int) -> int | None:
+        """Offset of the next sound records behind a damaged one; None if there are none."""
+        if self._unchunked:
+            return self._next_message(position)
+        telling = self._next_telling(position)
+        self._note_kind(telling)
+        # Compressed chunks hold parts of messages by chance, too: those are not looked for.
+        if self._chunked and (self._packed or not self._salvaging):
+            return telling
+        return self._next_message(position)
+
+    def _next_message(self, position: int) -> int | None:
+        return next_record(
+            self._stream, position + 1, self._size, messages=True, boundary=self._boundary
+        )
+
+    def _next_telling(self, position: int) -> int | None:
+        """The next record that is no message; looked for once, however many damages are before."""
+        searched, telling = self._telling
+        if not searched <= position or (telling is not None and telling <= position):
+            telling = next_record(self._stream, position + 1, self._size, messages=False)
+            self._telling = position, telling
+        return telling
+
+    def _note_kind(self, position: int | None) -> None:
+        """Learn from a record behind damage that the file has chunks, compressed or not."""
+        head = None if position is None else read_head(self._stream, position, self._size)
+        if head is not None and head.opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX):
+            extent = chunk_extent(self._stream, head)
+            if extent is not None:
+                self._packed = self._packed or extent.compressed
+            elif not self._chunked:
+                # Nothing is known of the chunks: they may be compressed.
+                self._packed = True
+            self._chunked = True
+
+    def _mark_damage(self, position: int) -> None:
+        self._settle_damage()
+        self._damaged = position
+        self.index.lost[position] = 0
+
+    def _settle_damage(self) -> None:
+        """Count what was lost at the last damage, by the message indexes behind it."""
+        if self._damaged is not None:
+            lost = max(0, self._indexed - self._recovered)
+            self.index.lost[self._damaged] = lost
+            if self._descended and self._recovered:
+                self.index.unverified[self._damaged] = self._recovered
+                if not lost:
+                    del self.index.lost[self._damaged]
+        self._damaged, self._descended = None, False
+        self._indexed = self._recovered = 0
+
+    # --- results -----------------------------------------------------------------------------
+
+    def _add_block(
+        self, start: int, end: int, *, chunk: bool, cut: bool = False, unverified: bool = False
+    ) -> int:
+        """Read a block and add it to the index; its number of messages, 0 if it is damaged."""
+        unread = Block(
+            offset=start,
+            length=end - start,
+            start_ns=0,
+            end_ns=0,
+            channels=None,
+            cut=cut,
+            chunk=chunk,
+            unverified=unverified,
+        )
+        try:
+            messages = load(self._stream, unread, self.index.catalogue)
+        except DamagedError as error:
+            if isinstance(error, TooLargeError):
+                self.index.refusals.add(str(error))
+            if not (cut or chunk or self._damaged is not None):
+                self._mark_damage(start)
+            return 0
+        count = len(messages)
+        if not chunk:
+            self._recovered += count
+        messages = self.index.with_valid_times(start, messages)
+        self.index.add_block(unread, messages)
+        return max(count, int(chunk and not unverified))
 
     def _has_footer(self) -> bool:
         self._stream.seek(self._size - len(MAGIC))
         return self._stream.read() == MAGIC
 
-    def _read_summary(self, position: int) -> None:
-        """Read the copies of channels and schemas at the end; the first ones may be damaged."""
-        self._stream.seek(position)
-        try:
-            for opcode, content in iterate_records(
-                memoryview(self._stream.read(_SUMMARY_BYTES)), cut=True
-            ):
-                self.index.catalogue.add(opcode, content)
-        except UNREADABLE:
-            return
-
-    def _handle_record(self, opcode: int, position: int, end: int) -> None:
-        if opcode == Opcode.MESSAGE_INDEX:
-            self._count_lost(position, end)
-            return
-        self._unchunked = self._unchunked or opcode == Opcode.MESSAGE
-        if opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
-            start = self._run[0] if self._run else position
-            self._run = (start, end)
-            if end - start >= _RUN_BYTES:
-                self._end_run()
-            return
-        self._end_run()
-        if opcode == Opcode.CHUNK:
-            self._add_block(position, end)
-
-    def _end_run(self) -> None:
-        if self._run is not None:
-            run, self._run = self._run, None
-            self._add_block(*run)
-
-    def _add_block(self, start: int, end: int, *, cut: bool = False) -> None:
-        unread = Block(
-            offset=start, length=end - start, start_ns=0, end_ns=0, channels=None, cut=cut
-        )
-        try:
-            messages = load(self._stream, unread, self.index.catalogue)
-        except DamagedError:
-            if not cut:
-                self._damaged, self._uncounted = start, 0
-                self.index.lost[start] = 0
-            return
-        self._uncounted = len(messages)
-        self._damaged = None
-        messages = self.index.with_valid_times(start, messages)
-        if not messages:
-            return
-        self.index.count(messages)
-        block = Block(
-            offset=start,
-            length=end - start,
-            start_ns=min(message.log_time_ns for message in messages),
-            end_ns=max(message.log_time_ns for message in messages),
-            channels=frozenset(message.channel for message in messages),
-            cut=cut,
-        )
-        self.index.blocks.append(block)
-
-    def _count_lost(self, position: int, end: int) -> None:
-        if self._damaged is None:
-            return
-        self._stream.seek(position + RECORD.size)
-        content = memoryview(self._stream.read(end - position - RECORD.size))
-        try:
-            count = indexed_messages(content)
-        except UNREADABLE:
-            return
-        self.index.lost[self._damaged] += max(0, count - self._uncounted)
-        self._uncounted = max(0, self._uncounted - count)
-
     def _note_truncation(self, position: int) -> None:
         self.index.bytes_unread = self._size - position
-        if position + RECORD.size > self._size:
-            return
-        self._stream.seek(position)
-        if self._stream.read(1)[0] == Opcode.CHUNK:
-            self._add_block(position, self._size, cut=True)
+        head = read_head(self._stream, position, self._size)
+        if head is not None and head.opcode == Opcode.CHUNK:
+            self._add_block(position, self._size, chunk=True, cut=True)
 
 
-def _plausible(opcode: int) -> bool:
-    return 0 < opcode <= _LAST_OPCODE or opcode >= _FIRST_PRIVATE_OPCODE
+def scan(stream: BinaryIO, size: int, *, salvaging: bool = False) -> McapIndex:
+    """Build an index by scanning a file of this size, [bytes], as far as it can be read.
 
-
-def scan(stream: BinaryIO, size: int) -> McapIndex:
-    """Build an index by scanning the file, as far as it can be read.
-
-    Parameters
-    ----------
-    stream : binary file
-    size : int, [bytes]
-
-    Returns
-    -------
-    McapIndex
+    For a salvage messages of chunks whose checksum is wrong are used, too, and counted.
     """
-    scanner = _Scanner(stream, size)
+    scanner = _Scanner(stream, size, salvaging=salvaging)
     scanner.run()
     return scanner.index

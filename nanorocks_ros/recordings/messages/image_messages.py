@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.limits import IMAGE_PIXELS, is_too_large
 from nanorocks_ros.recordings.jpeg_header import START as JPEG_START
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg
 from nanorocks_ros.records import NS, Frame
@@ -210,7 +211,9 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
 def _decoded(data: NDArray[np.uint8], flags: int = _READ) -> NDArray[np.uint8] | None:
     try:
         image = cv2.imdecode(data, flags)
-    except cv2.error:
+    except cv2.error as error:
+        if is_too_large(error):
+            raise IMAGE_PIXELS.exceeded(None, FrameError, 'image') from error
         return None
     return None if image is None else np.asarray(image, dtype=np.uint8)
 

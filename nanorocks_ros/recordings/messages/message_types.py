@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from nanorocks_ros.recordings.messages.type_limits import check_text, check_types
+
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
@@ -34,13 +36,15 @@ def register_type(store: Typestore, name: str, definition: str, form: str) -> No
     Raises
     ------
     rosbags.typesys.TypesysError
-        If the text cannot be parsed.
+        If the text cannot be parsed, or the type exceeds a limit.
     """
     if name in store.fielddefs:
         return
+    check_text(definition)
     types = (
         get_types_from_idl(definition)
         if form == 'ros2idl'
         else get_types_from_msg(definition, name)
     )
+    check_types({**store.fielddefs, **types})
     store.register({key: value for key, value in types.items() if key not in store.fielddefs})

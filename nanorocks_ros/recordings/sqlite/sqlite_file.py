@@ -35,6 +35,11 @@ _BY_TOPIC = (
     'SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages '
     f'WHERE {VALID_ROW} GROUP BY topic_id'
 )
+_NO_TABLES = (
+    "SELECT name, CASE type WHEN 'table' THEN 'virtual table' ELSE type END FROM sqlite_master "
+    "WHERE lower(name) IN ('messages', 'topics', 'message_definitions') AND "
+    "(type <> 'table' OR sql LIKE 'CREATE VIRTUAL%')"
+)
 _INVALID_ROWS = f'SELECT id FROM messages WHERE NOT ({VALID_ROW})'
 _CONTENT_OF_ROW = 'SELECT data FROM messages WHERE id = ?'
 
@@ -74,6 +79,7 @@ class SqliteFile:
         self._file = ReadOnlyDatabase(path)
         try:
             with closing(self._file.connect()) as database:
+                self._refuse_views(database)
                 try:
                     self._read(database)
                 except sqlite3.Error as error:
@@ -86,6 +92,20 @@ class SqliteFile:
                 f'cannot be read as a recording ({error})',
                 'pass another bag, or recover it with `sqlite3 FILE .recover`',
             ) from error
+
+    def _refuse_views(self, database: sqlite3.Connection) -> None:
+        """Raise unless messages and topics are tables: a view may count for ever."""
+        try:
+            names = database.execute(_NO_TABLES).fetchall()
+        except sqlite3.Error:
+            # Its schema is damaged: what can be read is read below.
+            return
+        if names:
+            raise RecordingError(
+                str(self.path),
+                f"holds '{names[0][0]}' as a {names[0][1]}, not as a table",
+                'pass a bag that a recorder wrote',
+            )
 
     def _read(self, database: sqlite3.Connection) -> None:
         rows = database.execute(_BY_TOPIC).fetchall()

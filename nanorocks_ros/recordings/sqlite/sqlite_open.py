@@ -12,7 +12,9 @@ import weakref
 from pathlib import Path
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import SQLITE_STEPS
 
+_STEPS_AT_ONCE = 100_000
 # Companion files of an open SQLite file: changes not merged yet (-wal), or the previous content
 # (-journal).
 _COMPANIONS = ('-wal', '-journal')
@@ -64,9 +66,23 @@ class ReadOnlyDatabase:
             ) from error
         return Path(folder) / path.name
 
+    def _bound_steps(self, database: sqlite3.Connection) -> None:
+        """Stop queries that would never end."""
+        left = SQLITE_STEPS.value
+
+        def use_steps() -> int:
+            nonlocal left
+            left -= _STEPS_AT_ONCE
+            return int(left < 0)
+
+        database.set_progress_handler(use_steps, _STEPS_AT_ONCE)
+
     def connect(self) -> sqlite3.Connection:
         """Open a connection; the caller closes it."""
         database = sqlite3.connect(self._uri, uri=True)
+        # Views and triggers of a file must not run functions; the rest is bounded by its size.
+        database.execute('PRAGMA trusted_schema=OFF')
+        self._bound_steps(database)
         # A flipped bit in a name must not make the messages unreadable.
         database.text_factory = lambda raw: raw.decode('utf-8', 'replace')
         return database

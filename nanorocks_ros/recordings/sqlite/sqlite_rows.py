@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.recordings.storage import LAST_NS
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 # Column types of an intact row; a row with other types is damaged.
 VALID_ROW = (
-    "typeof(timestamp) = 'integer' AND timestamp >= 0 "
+    f"typeof(timestamp) = 'integer' AND timestamp BETWEEN 0 AND {LAST_NS} "
     "AND typeof(topic_id) = 'integer' AND typeof(data) = 'blob'"
 )
 _ROWS = f'SELECT timestamp, id, topic_id FROM messages WHERE id BETWEEN ? AND ? AND {VALID_ROW}'

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import struct
 import zipfile
 import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nanorocks_ros.archive_limits import check_archive
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.limits import require_regular_file
 from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.simulation.engine.gas_state import State
 from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
@@ -22,6 +25,20 @@ if TYPE_CHECKING:
 # Incremented with every change of the fields of a state.
 _FORM = 3
 _DIGEST = 'sha256'
+# What zipfile and numpy raise for damaged files and files of other formats.
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    EOFError,
+    KeyError,
+    RuntimeError,
+    NotImplementedError,
+    OverflowError,
+    MemoryError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def _digest(arrays: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
@@ -57,15 +74,15 @@ def load(path: Path) -> tuple[State, Rules, int]:
         When it cannot be read, is damaged, or was written by another release.
     """
     try:
-        with zipfile.ZipFile(path):
-            # Refuses a single array or a pickle: only an archive is a checkpoint.
-            pass
+        require_regular_file(path, SimulationError)
+        # Refuses a single array or a pickle, too: only an archive is a checkpoint.
+        check_archive(path, str(path), SimulationError)
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except OSError as error:
         reason = error.strerror or 'is not a saved gas'
         raise SimulationError(str(path), reason, 'name a file that was saved') from error
-    except (ValueError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGE as error:
         raise SimulationError(str(path), 'is damaged', 'use another saved state') from error
     digest = arrays.pop(_DIGEST, None)
     if digest is None or 'form' not in arrays:

@@ -17,6 +17,7 @@ from nanorocks_ros.recordings.messages.image_messages import (
     valid_stamp_ns,
 )
 from nanorocks_ros.records import NS, Frame, GroundTruth
+from nanorocks_ros.studies.analysis.impossible_stamps import with_possible_stamps
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
@@ -130,10 +131,10 @@ class BagFrames:
         """The frames, decoded, in the order they were recorded.
 
         In the place of a frame that cannot be used stands the reason: an encoding that is
-        not supported, a picture that cannot be decoded.
+        not supported, a picture that cannot be decoded, a stamp that cannot be.
         """
-        for _, frame in self.recorded_frames():
-            yield frame
+        frames = (frame for _, frame in self.recorded_frames())
+        return with_possible_stamps(frames, self.where)
 
     def recorded_frames(
         self, start_ns: int | None = None, end_ns: int | None = None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nanorocks_ros.limits import PAUSE_SECONDS
 from nanorocks_ros.outputs.disk_list import Spool, SpoolFile
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.records import (
@@ -195,7 +196,8 @@ class Analysis:
         if steps.size == 0:
             return 0
         usual = float(np.median(steps))
-        gaps = steps[steps > _GAP * usual]
+        # A clock that was set is no gap.
+        gaps = steps[(steps > _GAP * usual) & (steps <= PAUSE_SECONDS.value * NS)]
         return int(np.sum(np.rint(gaps / usual) - 1))
 
 

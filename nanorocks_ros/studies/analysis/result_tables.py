@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.limits import require_regular_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,6 +49,7 @@ def read_columns(
     RecordingError
         When the table cannot be read, or a column that is wanted is missing.
     """
+    require_regular_file(path, RecordingError)
     try:
         with path.open(encoding='utf-8', newline='') as stream:
             lines = (line for line in csv.reader(stream) if line)

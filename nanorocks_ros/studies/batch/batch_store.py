@@ -19,6 +19,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import lock_folder
 from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
@@ -253,11 +254,11 @@ class BatchStore:
     def _read(self) -> dict[Path, Entry]:
         path = self.folder / MANIFEST
         try:
-            content = json.loads(path.read_text('utf-8'))
+            content = read_object(path)
             return {entry.path: entry for entry in map(_from_json, content['bags'])}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecordingError):
             self.notices.append(f'{path}: is damaged; recordings are looked at anew')
             return self._from_folders()
 

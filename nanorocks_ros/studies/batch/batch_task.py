@@ -23,7 +23,7 @@ from nanorocks_ros.experiment.recorded_experiment import (
 )
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.outputs.json_values import json_values
+from nanorocks_ros.outputs.json_values import json_values, read_object
 from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
@@ -259,10 +259,10 @@ def _outcome(summary: BagSummary, files: tuple[FileState, ...]) -> BagOutcome:
 def read_summary(folder: Path) -> BagSummary | None:
     """The summary in a folder of results; None where there is none that can be read."""
     try:
-        summary = json.loads((folder / SUMMARY).read_text('utf-8'))
-    except (OSError, ValueError):
+        summary = read_object(folder / SUMMARY)
+    except (OSError, ValueError, RecordingError):
         return None
-    if isinstance(summary, dict) and summary.get('format') == 1:
+    if summary.get('format') == 1 and set(BagSummary.__annotations__) <= set(summary):
         return cast('BagSummary', summary)
     return None
 

@@ -85,8 +85,9 @@ class ImportResult:
             )
 
     def add_damaged(self, film: Film) -> None:
-        """Add the damaged frames of a film, with a notice."""
+        """Add the damaged and missing frames of a film, with notices."""
         self.damaged += film.damaged
+        self.notices += [f'{film.info.path}: {loss}' for loss in film.losses]
         if film.damaged:
             self.notices.append(
                 f'{film.info.path}: {film.damaged} frames that are damaged or of another size '

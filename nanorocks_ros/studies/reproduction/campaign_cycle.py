@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.settings import CompressionSettings, SceneSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results_folder import write_results
@@ -149,7 +150,7 @@ def read_cycle(task: CycleTask) -> CycleFiles:
     """
     path = task.folder / SUMMARY
     try:
-        summary = json.loads(path.read_text('utf-8'))
+        summary = read_object(path)
     except (OSError, ValueError) as error:
         raise RecordingError(
             str(path), 'is damaged', f'delete {task.folder} and run the command again'

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.studies.reproduction.campaign_cycle import (
     CycleFiles,
     film_and_analyse,
@@ -48,13 +50,13 @@ def prepare_campaign(folder: Path, plan: CampaignPlan) -> None:
                 str(folder), 'exists and holds no campaign', 'pass another --output'
             )
         folder.mkdir(parents=True, exist_ok=True)
-        if mark.is_file() and json.loads(mark.read_text('utf-8')) != settings:
+        if mark.is_file() and read_object(mark) != settings:
             raise RecordingError(
                 str(folder),
                 'holds a campaign of other settings',
                 'pass another --output, or the settings of that campaign',
             )
-        mark.write_text(json.dumps(settings), 'utf-8')
+        write_bytes(mark, json.dumps(settings).encode())
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else 'its mark is damaged'
         raise RecordingError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.json_values import parse_object
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
 from nanorocks_ros.studies.sweeps.sweep_plan import Axis
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.npz_archive import Arrays
+    from nanorocks_ros.outputs.json_values import parse_object
+from nanorocks_ros.outputs.npz_archive import Arrays
 
 CURVES = ('mean_speed', 'mean_speed_error', 'mean_projected_speed', 'mean_projected_speed_error')
 _RUNS = ('run_mean_speed', 'run_mean_projected_speed')
@@ -107,7 +108,8 @@ class Sweep:
         arrays = read_archive(path)
         try:
             specification = str(arrays[_SPECIFICATION])
-            plan = json.loads(specification)
+            plan = parse_object(specification)
+            _ = plan['settings']
             axes = tuple(
                 Axis(name=name, values=tuple(values)) for name, values in plan['axes'].items()
             )
@@ -120,7 +122,7 @@ class Sweep:
                 **{name: arrays[name] for name in _RUNS if name in arrays},
             )
             sweep._check_shapes()
-        except (KeyError, ValueError, TypeError, AttributeError) as error:
+        except (LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
             raise RecordingError(
                 str(path), 'holds no sweep', 'name a file that `nanorocks sweep` wrote'
             ) from error

@@ -332,4 +332,4 @@ def test_a_bag_below_a_file_is_refused(tmp_path, capsys, command):
     more = ['--rate', '30'] if command == 'import' else []
     code, _, last = run(capsys, command, source, '-o', tmp_path / 'file' / 'new', *more)
     assert code == 1
-    assert 'cannot be written (Not a directory)' in last
+    assert 'is no folder; write elsewhere' in last

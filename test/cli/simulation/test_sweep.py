@@ -225,3 +225,12 @@ def test_a_terminated_command_leaves_no_workers_and_keeps_its_parts(tmp_path):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     assert len(list(folder.glob('[0-9]*.npz'))) >= 4
+
+
+def test_a_table_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys):
+    output = tmp_path / 'sweep.npz'
+    words = ['--runs', '2', '--times', '0:1:2', '--restitution', '0.8']
+    table = tmp_path / 'nowhere' / 'x.csv'
+    assert main(['sweep', *words, '-o', str(output), '--csv', str(table)]) == 1
+    assert 'there is no folder' in capsys.readouterr().err
+    assert not output.exists()

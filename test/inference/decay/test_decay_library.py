@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -134,3 +135,25 @@ def test_a_changed_byte_is_detected(tmp_path):
     other.write_bytes(content)
     with pytest.raises(ConfigurationError, match='damaged'):
         load_library(str(other), packaged=False)
+
+
+@pytest.mark.parametrize('change', ['transposed', 'huge', 'text', 'no tray', 'NaN'])
+def test_an_archive_of_another_form_is_refused_at_once(tmp_path, change):
+    """Its checksums are right; one with many distances took minutes and all memory."""
+    packaged = resources.files('nanorocks_ros.inference.decay').joinpath('libraries/tray_1.npz')
+    with packaged.open('rb') as stream, np.load(stream) as file:
+        arrays = dict(file)
+    if change == 'transposed':
+        arrays['covariance'] = arrays['covariance'].T
+    elif change == 'huge':
+        arrays['distances'] = np.zeros(100_000)
+    elif change == 'text':
+        arrays['coefficients'] = arrays['coefficients'].astype(str)
+    elif change == 'no tray':
+        arrays['tray'] = np.array('[1]')
+    else:
+        arrays['covariance'] = np.full_like(arrays['covariance'], np.nan)
+    path = tmp_path / 'library.npz'
+    np.savez(path, **arrays)
+    with pytest.raises(ConfigurationError, match='is damaged, or no decay library; make it'):
+        load_library(str(path), packaged=False)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import os
 import shlex
+import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -19,6 +22,7 @@ from nanorocks_ros.recordings.mcap import mcap_file
 from nanorocks_ros.recordings.mcap.mcap_blocks import load
 from nanorocks_ros.recordings.messages.message_builders import time_message
 from nanorocks_ros.recordings.offered_qos import OfferedQos, recorded_qos
+from nanorocks_ros.recordings.storage import LAST_NS
 
 EPOCH = '/nanorocks/epoch'
 SPEED = '/nanorocks/tray_3/speed'
@@ -570,15 +574,91 @@ def test_messages_with_impossible_times_are_skipped_and_counted(tmp_path, chunke
     writer.start()
     schema = writer.register_schema('std_msgs/msg/Empty', 'ros2msg', b'')
     channel = writer.register_channel('/empty', 'cdr', schema)
-    for stamp in (5, 6, 2**63 + 7, 8, 2**64 - 1, 2**63 - 1):
+    for stamp in (5, 6, 2**63 + 7, 8, 2**63 - 1, LAST_NS):
         writer.add_message(channel, stamp, b'\0\1\0\0\0', stamp)
     writer.finish()
     if not ended:
         path.write_bytes(path.read_bytes()[:-40])
     bag = open_bag(path)
     for _ in range(2):
-        assert [message.log_time_ns for message in bag.messages()] == [5, 6, 8, 2**63 - 1]
+        assert [message.log_time_ns for message in bag.messages()] == [5, 6, 8, LAST_NS]
         assert bag.messages_lost == 2
         assert not bag.complete
         assert bag.notices[-1] == f'{path}: 2 messages with impossible time stamps were skipped'
-    assert (bag.start_ns, bag.end_ns) == (5, 2**63 - 1)
+    assert (bag.start_ns, bag.end_ns) == (5, LAST_NS)
+
+
+@pytest.mark.parametrize('count', [80, 82])
+def test_a_count_that_metadata_contradicts_is_told(tmp_path, record, count):
+    path = record(tmp_path / 'run')
+    file = path / 'metadata.yaml'
+    text = file.read_text()
+    assert text.count('message_count: 81') == 2
+    file.write_text(text.replace('message_count: 81', f'message_count: {count}'))
+    bag = open_bag(path)
+    assert not bag.complete
+    assert f'{path}: metadata.yaml counts {count} messages, the files hold 81' in bag.notices
+
+
+def test_a_file_that_is_listed_three_times_is_read_once(tmp_path, record):
+    path = record(tmp_path / 'run')
+    file = path / 'metadata.yaml'
+    text = file.read_text()
+    name = '  - run.mcap\n'
+    assert text.count(name) == 1
+    file.write_text(text.replace(name, 3 * name))
+    bag = open_bag(path)
+    assert bag.complete
+    assert len(list(bag.messages())) == 81
+
+
+def test_provenance_that_differs_from_its_copy_is_told(tmp_path, record):
+    path = record(tmp_path / 'run')
+    file = path / 'metadata.yaml'
+    file.write_text(file.read_text().replace("tray: '3'", "tray: '5'"))
+    (notice,) = open_bag(path).notices
+    assert 'its provenance differs from the copy in run.mcap' in notice
+
+
+@pytest.mark.parametrize('place', ['metadata.yaml', 'run.mcap'])
+def test_a_pipe_in_the_place_of_a_file_is_refused_at_once(tmp_path, record, place):
+    path = record(tmp_path / 'run')
+    (path / place).unlink()
+    os.mkfifo(path / place)
+    if place == 'metadata.yaml':
+        assert 'is no regular file' in open_bag(path).notices[0]
+    else:
+        with pytest.raises(RecordingError):
+            open_bag(path / place)
+
+
+def test_a_view_in_the_place_of_a_table_is_refused(tmp_path):
+    """It may count for ever."""
+    folder = write_with_rosbags(tmp_path / 'run', StoragePlugin.SQLITE3)
+    file = next(folder.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute('ALTER TABLE messages RENAME TO old')
+        database.execute(
+            'CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 '
+            "FROM n) SELECT id, 1 AS topic_id, id AS timestamp, x'00' AS data FROM n"
+        )
+    with pytest.raises(RecordingError, match="holds 'messages' as a view, not as a table"):
+        open_bag(folder)
+
+
+def test_a_query_that_takes_too_long_ends(tmp_path, monkeypatch):
+    folder = write_with_rosbags(tmp_path / 'run', StoragePlugin.SQLITE3)
+    file = next(folder.glob('*.db3'))
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute(
+            'INSERT INTO messages(topic_id, timestamp, data) WITH RECURSIVE n(i) AS (SELECT 9 '
+            "UNION ALL SELECT i + 1 FROM n LIMIT 50000) SELECT 1, i, x'00' FROM n"
+        )
+    assert len(list(open_bag(file).messages())) == 50_003
+    monkeypatch.setenv('NANOROCKS_MAX_SQLITE_STEPS', '1')
+    try:
+        bag = open_bag(file)
+    except RecordingError as error:
+        one_line(error)
+    else:
+        assert not bag.complete

@@ -127,15 +127,16 @@ def changed(path, start, content, cut=0):
 
 
 @pytest.mark.parametrize('cut', [0, 40])
-def test_an_impossible_length_inside_a_chunk_costs_that_chunk(tmp_path, record, cut):
+def test_an_impossible_length_inside_a_chunk_costs_nothing(tmp_path, record, cut):
+    """The length of its record says where it ends."""
     path = record(tmp_path / 'run', frames=100, size=9000)
     everything = list(open_bag(path).messages())
     # The highest byte of the length of the records, behind times, size, checksum and 'zstd'.
     changed(path / 'run.mcap', chunks(path / 'run.mcap')[1].chunk_start_offset + 52, b'\xff', cut)
     result, messages = salvaged(path, tmp_path / 'new')
-    assert [message for message in everything if message in messages] == messages
-    assert result.lost > 0
-    assert result.recovered + result.lost == 201
+    assert messages == everything
+    assert result.lost == 0
+    assert any('damaged heads were read all the same' in notice for notice in result.notices)
 
 
 @pytest.mark.parametrize('cut', [0, 40])
@@ -346,7 +347,8 @@ def test_a_sqlite_file_with_a_log_beside_it_is_read_and_not_touched(
     for bag in (left, left / 'run.db3'):
         reader = open_bag(bag)
         assert len(list(reader.messages())) == 59
-        assert reader.complete
+        # The folder says that there were 60.
+        assert reader.complete == (bag != left)
         del reader
     salvaged(left, tmp_path / 'new')
     assert sorted(os.listdir(left)) == before

@@ -236,3 +236,13 @@ def test_a_frame_without_a_usable_stamp_is_refused_raw_and_compressed(stamp_ns, 
         with pytest.raises(FrameError, match=message) as refused:
             convert(image, WHERE)
         assert 'configure the camera driver to stamp its frames' in str(refused.value)
+
+
+def test_the_size_of_an_image_is_limited_before_it_is_decoded():
+    """A JPEG of some bytes that claims 60000 x 60000 pixels."""
+    content = bytearray(encode_jpeg(np.zeros((16, 16, 3), np.uint8), 90))
+    place = content.index(b'\xff\xc0') + 5
+    content[place : place + 4] = b'\xea\x60\xea\x60'
+    message = compressed_image_message(5, 'camera', 'jpeg', bytes(content))
+    with pytest.raises(FrameError, match='NANOROCKS_MAX_IMAGE_PIXELS'):
+        frame_from_compressed(message, '/camera')

@@ -441,3 +441,20 @@ def test_a_bag_without_a_name_has_its_results_beside_it(tmp_path, capsys, monkey
     assert run('analyse', '.') == 0
     assert (tmp_path / 'bag_results' / BAG_NAME).is_dir()
     assert f'results in {tmp_path}/bag_results' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('place', [0, 20, 39])
+def test_one_far_future_stamp_costs_its_frame_alone(tmp_path, place):
+    start = 1_000_000_000 * NS
+    stamps = [start + number * NS // 30 for number in range(40)]
+    clean = analyse(raw_bag(tmp_path / 'clean', stamps), PipelineSettings(trays=(1,)))
+    changed = [*stamps]
+    # The log times follow the first stamp, and have to stay below the end of ROS times.
+    changed[place] = (2**31 - 100) * NS
+    bag = raw_bag(tmp_path / 'bag', changed)
+    result = analyse(bag, PipelineSettings(trays=(1,)))
+    assert not result.complete
+    assert result.refused == 1
+    assert result.frames == clean.frames - 1
+    assert result.frames_lost <= 1
+    assert result.seconds < 2.0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import sys
 from dataclasses import replace
 
@@ -161,10 +163,14 @@ def test_without_pyarrow_it_says_what_to_install(tmp_path, two_runs, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, two_runs):
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, two_runs, monkeypatch):
     path = tmp_path / 'run.npz'
     path.write_bytes(b'old')
-    (tmp_path / '.run.part.npz').mkdir()
+
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(os, 'fsync', full)
     with pytest.raises(RecordingError, match=r'run\.npz: cannot be written'):
         write_trajectory(path, two_runs)
     assert path.read_bytes() == b'old'

@@ -1,0 +1,1 @@
+"""Seeded damage of every kind of input, for `python -m benchmarks fuzz`."""

@@ -1,0 +1,76 @@
+"""Kills at random instants: what was written is readable, and the same command finishes the job.
+
+``python -m benchmarks kills --count 200 --journal kills.jsonl`` runs the kills that the journal
+lacks and prints the table of all of them, so it may be interrupted and called again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.fuzzing.mutations import generator_of
+from benchmarks.killed_jobs import JOBS, ORDER, Job
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run and print; 1 if anything was lost."""
+    parser = argparse.ArgumentParser(prog='benchmarks kills', description=__doc__.splitlines()[0])
+    parser.add_argument('--count', type=int, default=20, help='kills of all jobs together')
+    parser.add_argument('--journal', help='file of outcomes, to which this call adds')
+    options = parser.parse_args(arguments)
+    done = _read(options.journal)
+    jobs: dict[str, Job] = {}
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            for number in range(options.count):
+                if number in done:
+                    continue
+                name = ORDER[number % len(ORDER)]
+                if name not in jobs:
+                    jobs[name] = JOBS[name](Path(folder) / name)
+                done[number] = [name, *jobs[name].kill(generator_of('kills', number))]
+                _note(options.journal, number, done[number])
+    except KeyboardInterrupt:
+        print('interrupted; the same command continues', file=sys.stderr)
+    print(table(list(done.values())))
+    return int(not all(good for _, good, _ in done.values()))
+
+
+def _read(journal: str | None) -> dict[int, list]:
+    done: dict[int, list] = {}
+    if journal and Path(journal).is_file():
+        for line in Path(journal).read_text('utf-8').splitlines():
+            if line.endswith(']'):
+                number, *outcome = json.loads(line)
+                done[number] = outcome
+    return done
+
+
+def _note(journal: str | None, number: int, outcome: list) -> None:
+    if journal:
+        with Path(journal).open('a', encoding='utf-8') as stream:
+            stream.write(f'\n{json.dumps([number, *outcome])}')
+
+
+def table(outcomes: list[list]) -> str:
+    """Kills of each job, how many left everything in order, and the largest loss."""
+    lines = [
+        '| job | kills | resumed bit-identical, or lost at most 2 s | others | largest loss [s] |',
+        '| --- | --- | --- | --- | --- |',
+    ]
+    for name in JOBS:
+        own = [(good, loss) for job, good, loss in outcomes if job == name]
+        if own:
+            good = sum(each for each, _ in own)
+            losses = [loss for _, loss in own if loss is not None]
+            loss = f'{max(losses):.2f}' if losses else ''
+            lines.append(f'| {name} | {len(own)} | {good} | {len(own) - good} | {loss} |')
+    return '\n'.join(lines)

@@ -1,0 +1,99 @@
+"""What a film states about itself against what was read of it.
+
+Tested by ``test/recordings/film/test_film_losses.py``.
+"""
+
+from __future__ import annotations
+
+from array import array
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nanorocks_ros.records import NS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# Containers whose stated duration is written by the camera; FFmpeg estimates that of others.
+_STATING = ('mov', 'matroska', 'flv', 'asf', 'avi')
+# Steps that count as usual, and the share of them in a film of constant rate.
+_TOLERANCE, _STEADY_SHARE = 0.1, 0.95
+_GAP, _FEWEST = 1.5, 10
+# Rounding of the stated duration, in frames, and shortest part that counts as missing, [s].
+_FRAMES_OF_ROUNDING, _SHORTEST = 2, 0.2
+
+
+class FilmLosses:
+    """Counts the packets of a film and notes their times.
+
+    Parameters
+    ----------
+    expected : int
+        Number of frames that the film states; 0 if it states none.
+    duration : float, [s]
+        Duration that it states; 0 if it states none.
+    """
+
+    def __init__(self, expected: int, duration: float) -> None:
+        self._expected = expected
+        self._duration = duration
+        self._times_ns = array('q')
+        self._packets = 0
+
+    def note(self, time_ns: int | None) -> None:
+        """A packet of the film, with the time at which it is shown."""
+        self._packets += 1
+        if time_ns is not None and abs(time_ns) < 2**62:
+            self._times_ns.append(time_ns)
+
+    def sentences(self) -> Iterator[str]:
+        """What is missing, in sentences; known once the film has been read."""
+        if self._packets < self._expected:
+            yield (
+                f'states {self._expected} frames, {self._packets} are there: it was cut short, or '
+                'parts of it are missing'
+            )
+            return
+        times = np.unique(np.array(self._times_ns, dtype=np.int64))
+        if times.size < _FEWEST:
+            return
+        steps = np.diff(times)
+        step = float(np.median(steps))
+        length = (float(times[-1] - times[0]) + step) / NS
+        missing = self._duration - length
+        if missing > max(_SHORTEST, _FRAMES_OF_ROUNDING * step / NS):
+            yield (
+                f'states {self._duration:.2f} s, {length:.2f} s are there: it was cut short, or '
+                'parts of it are missing'
+            )
+        yield from _gaps(steps, step)
+
+
+def _gaps(steps: np.ndarray[Any, np.dtype[np.int64]], step: float) -> Iterator[str]:
+    """Gaps of a film whose rate is otherwise constant."""
+    usual = np.abs(steps - step) <= _TOLERANCE * step
+    if usual.mean() < _STEADY_SHARE:
+        return
+    gaps = steps[steps > _GAP * step]
+    if gaps.size:
+        frames = int(np.sum(np.rint(gaps / step) - 1))
+        yield f'has {gaps.size} gaps, where {frames} frames are missing'
+
+
+def stated_duration(container: Any, stream: Any) -> float:
+    """Duration of the video that a container states, [s]; 0 if it states none.
+
+    Parameters
+    ----------
+    container, stream : objects of PyAV
+    """
+    if not container.format.name.startswith(_STATING):
+        return 0.0
+    if stream.duration and stream.time_base:
+        return float(stream.duration * Fraction(stream.time_base))
+    # The longest of several streams need not be the film.
+    if container.duration and len(container.streams) == 1:
+        return float(container.duration) / 1e6
+    return 0.0
