@@ -13,7 +13,8 @@ from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results_folder import write_results
-from nanorocks_ros.studies.libraries.decay_simulations import LibraryPlan, build_library
+from nanorocks_ros.studies.libraries.decay_simulations import build_library
+from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
