@@ -155,7 +155,8 @@ def test_a_silent_camera_and_the_camera_info_of_another_one_are_told(graph):
     camera.send_camera_info(frame_id='left')
     process = graph.start('preprocessor')
     camera.film_until(lambda: camera.trays)
-    camera.film_until(lambda: "frame_id 'left', but the images" in statuses[-1].message)
+    lens = "frame_id 'left', but the images"
+    camera.film_until(lambda: statuses and lens in statuses[-1].message)
     assert statuses[-1].level == DiagnosticStatus.WARN
     # The camera stops, but its publisher is there.
     silent = '/nanorocks/camera/image_raw: no frame for'
