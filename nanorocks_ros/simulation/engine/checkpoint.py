@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Incremented with every change of the fields of a state.
-_FORM = 3
+_FORM = 4
 _DIGEST = 'sha256'
 
 
