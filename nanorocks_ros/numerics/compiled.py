@@ -92,7 +92,7 @@ def kernel_where(
         def call(*arguments: Any) -> Any:
             return compiled_kernel(*arguments)
 
-        def give_constant(*_arguments: Any) -> Any:
+        def give_constant(*arguments: Any) -> Any:
             return otherwise
 
         def choose(*arguments: Any) -> Callable[..., Any]:

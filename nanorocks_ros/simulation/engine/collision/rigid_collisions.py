@@ -133,7 +133,7 @@ def least_separation(state: State, rules: Rules, i: int) -> float:
     """Speed at which a bead must leave a contact not to be back within a contact duration, [m/s].
 
     The rotation of its body can press it against what it has just left; without this, it would
-    hit it without end at one instant.
+    hit it without end at one instant. A contact that is slower than this is elastic.
     """
     return 0.5 * largest_bend(state, i) * rules.contact_duration
 
@@ -165,7 +165,7 @@ def collide_rigid_bodies(
     )
     normal = scaled(apart, 1.0 / length(apart))
     least = least_separation(state, rules, i) + least_separation(state, rules, j)
-    after = max(-restitution * closing, least)
+    after = max(-restitution * closing, min(least, -closing))
     start_impact(state, i, now)
     start_impact(state, j, now)
     per = inverse_mass_along(state, i, normal) + inverse_mass_along(state, j, normal)
@@ -211,7 +211,7 @@ def push_off_wall(
     """
     before, after = speeds
     marked = mark_and_release(state, rules, i, now, abs(before), 0)
-    least = least_separation(state, rules, i)
+    least = min(least_separation(state, rules, i), abs(before))
     if abs(after) < least:
         after = -least if before > 0.0 else least
     normal = 1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2)
