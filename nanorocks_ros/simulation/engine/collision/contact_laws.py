@@ -1,6 +1,6 @@
 """What the rules say of a contact: its restitution, whether it sticks, whether it is repeated.
 
-Tested by ``test/simulation/engine/collision/test_bead_collisions.py``.
+Tested by ``test/simulation/engine/collision/test_rigid_collisions.py``.
 """
 
 from __future__ import annotations
