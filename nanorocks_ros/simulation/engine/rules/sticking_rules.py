@@ -114,7 +114,7 @@ def _check_combined(*, rough: bool, periodic: bool) -> None:
     if rough:
         raise SimulationError(
             'tangential_restitution',
-            'bodies that turn have smooth beads',
+            'beads of bodies that turn are smooth',
             f'{remedy}, or leave it',
         )
     if periodic:

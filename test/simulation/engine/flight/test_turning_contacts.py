@@ -48,7 +48,7 @@ def test_nothing_overlaps_in_a_long_run_of_large_bodies(kernel):
     times = np.linspace(0.0, 600.0, 12_001)
     record = gas.follow(600.0, times)
     assert np.bincount(gas.bodies).max() > 8
-    assert gas.counts.wall > 500
+    assert gas.counts.wall > 150
     assert smallest_gap(record.positions, beads.radii, rules) > -1e-10
 
 
