@@ -127,7 +127,7 @@ def refuse_turning_in_drag(rotating: bool) -> None:
         raise SimulationError(
             'drag',
             'bodies that turn fly without drag',
-            'set aggregate_motion=translating, or drag to 0',
+            'set aggregate_motion to translating, or drag to 0',
         )
 
 

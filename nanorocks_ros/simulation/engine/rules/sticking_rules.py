@@ -93,7 +93,7 @@ class StickingRules:
             raise SimulationError(
                 'break_up_speed',
                 'only bodies that turn break up',
-                f'set sticking_speed and aggregate_motion={ROTATING!r}, or break_up_speed to 0',
+                f'set sticking_speed, with aggregate_motion {ROTATING}, or break_up_speed to 0',
             )
         fastest = self.sticking_speed + 0.5 * self.sticking_speed_width
         if self.break_up_speed <= fastest:
@@ -110,7 +110,7 @@ def _check_choice(name: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def _check_combined(*, rough: bool, periodic: bool) -> None:
-    remedy = f'set aggregate_motion={TRANSLATING!r}'
+    remedy = f'set aggregate_motion to {TRANSLATING}'
     if rough:
         raise SimulationError(
             'tangential_restitution',

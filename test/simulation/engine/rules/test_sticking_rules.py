@@ -34,11 +34,11 @@ BOX = (10.0, 10.0, 10.0)
         ),
         (
             {'sticking_speed': 0.2, 'tangential_restitution': 0.5},
-            "tangential_restitution: .* smooth; set aggregate_motion='translating'",
+            'tangential_restitution: .* smooth; set aggregate_motion to translating',
         ),
         (
             {'sticking_speed': 0.2, 'periodic': (True, False, False)},
-            "periodic: bodies cannot turn .*; set aggregate_motion='translating'",
+            'periodic: bodies cannot turn .*; set aggregate_motion to translating',
         ),
     ],
 )
