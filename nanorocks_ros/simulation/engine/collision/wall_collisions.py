@@ -70,7 +70,7 @@ from nanorocks_ros.simulation.engine.vectors import cross, length
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
-# A bead farther from a moving wall than this fraction of its radius does not touch it.
+# A bead farther from a wall than this fraction of its radius does not touch it.
 _APART = 1e-6
 
 
@@ -184,9 +184,11 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     if rules.moving and abs(rows[i, X + axis] - surface) > _APART * radius:
         return 0
     if is_turning(state) and turns(state, i):
-        advance_body(state, i, now)
-        if is_leaving(state, i, wall, wall_speed):
+        # A search that takes many steps ends before the contact.
+        distant = abs(rows[i, X + axis] - surface) > _APART * radius
+        if distant or is_leaving(state, i, wall, wall_speed):
             return 0
+        advance_body(state, i, now)
     shift_body(state, rules, i, axis, surface - rows[i, X + axis])
     rows[i, X + axis] = surface
     number = as_int64(state.links[i, ORIGINAL])
