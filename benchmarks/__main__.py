@@ -50,6 +50,7 @@ ALL = (
     'sticking',
     'sticking_films',
     'turning_bodies',
+    'rotating_aggregates',
     'packing',
     'rotation',
     'decay_libraries',

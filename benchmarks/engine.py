@@ -152,8 +152,15 @@ def report_features() -> None:
     print('time per event with a feature on, over the time with none (median of five pairs)\n')
     features = {
         'rough spheres': {'tangential_restitution': 1.0, 'wall_tangential_restitution': 1.0},
-        'sticking, at a speed that never occurs': {'sticking_speed': 1e-12},
-        'both': {'tangential_restitution': 1.0, 'sticking_speed': 1e-12},
+        'sticking, at a speed that never occurs': {
+            'sticking_speed': 1e-12,
+            'aggregate_motion': 'translating',
+        },
+        'both': {
+            'tangential_restitution': 1.0,
+            'sticking_speed': 1e-12,
+            'aggregate_motion': 'translating',
+        },
         'restitution drawn at random': {'restitution': UniformRestitution(mean=1.0, width=0.0)},
     }
     for name, rules in features.items():

@@ -35,6 +35,7 @@ def _settings(speed: float, **more: float) -> SimulationSettings:
         wall_restitution=0.97,
         mean_speed=0.010,
         sticking_speed=speed,
+        aggregate_motion='translating',
         seed=6,
         **more,
     )

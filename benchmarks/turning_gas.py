@@ -1,6 +1,6 @@
 """Hard spheres in a box that stick when slow and then turn as rigid bodies: truth for recognition.
 
-It shares nothing with `nanorocks_ros.simulation`, whose bodies do not turn: time stepping, free
+It shares nothing with `nanorocks_ros.simulation`, whose bodies turn as well: time stepping, free
 rigid bodies with momentum and angular momentum in three dimensions, smooth contacts.
 """
 

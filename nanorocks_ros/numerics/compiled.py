@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import logging
 from contextlib import suppress
+from functools import update_wrapper
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
+from numba import extending
 from numba.core import event
 
 from nanorocks_ros.numerics.kernel_cache import share
@@ -22,6 +24,8 @@ LOGGER = logging.getLogger('nanorocks_ros')
 
 # Functions that take longest to compile, and the part of the program they belong to.
 _SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
+
+_OPTIONS = {'error_model': 'numpy', 'nogil': True}
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
@@ -59,6 +63,44 @@ class _Announcer(event.Listener):
 event.register('numba:compile', _Announcer())  # type: ignore[no-untyped-call]
 
 
+def kernel_where(
+    applies: Callable[[Any], bool], otherwise: object
+) -> Callable[[Function], Function]:
+    """Compile a kernel only for some types of its first argument.
+
+    For all others a call gives a constant, and the kernel and what it calls are not compiled: a
+    branch that a type rules out costs no time, neither when it runs nor to compile.
+
+    Parameters
+    ----------
+    applies : callable
+        Whether the kernel applies, from the numba type of the first argument.
+    otherwise : object
+        A value of the type that the kernel returns.
+    """
+
+    def decorate(function: Function) -> Function:
+        compiled_kernel = kernel(function)
+
+        def entry(*arguments: Any) -> Any:
+            return compiled_kernel(*arguments)
+
+        def call(*arguments: Any) -> Any:
+            return compiled_kernel(*arguments)
+
+        def give_constant(*arguments: Any) -> Any:
+            return otherwise
+
+        def choose(*arguments: Any) -> Callable[..., Any]:
+            return call if applies(arguments[0]) else give_constant
+
+        overload: Any = extending.overload
+        overload(entry, jit_options={**_OPTIONS, '_nrt': False, 'forceinline': True})(choose)
+        return cast('Function', update_wrapper(entry, function))
+
+    return decorate
+
+
 def inlined(function: Function) -> Function:
     """Compile a function into every place in a kernel that calls it.
 
@@ -81,5 +123,5 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 
 
 def _njit(function: Function, options: dict[str, Any]) -> Function:
-    decorator: Any = numba.njit(**{'error_model': 'numpy', 'nogil': True, **options})
+    decorator: Any = numba.njit(**{**_OPTIONS, **options})
     return cast('Function', decorator(function))

@@ -47,6 +47,7 @@ class Purpose(IntEnum):
     NOISE = 4
     TEXTURE = 5
     RESTITUTION = 6
+    STICKING = 7
 
 
 def key_for(root_seed: int, run: int, purpose: Purpose) -> np.uint64:

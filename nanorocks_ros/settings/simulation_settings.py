@@ -79,6 +79,27 @@ class SimulationSettings:
         'speed compared with the sticking speed: along the normal of the contact, or the total',
         choices=('normal', 'total'),
     )
+    sticking_speed_width: float = setting(
+        0.0,
+        'full width over which the probability to stick falls from 1 to 0, around sticking_speed; '
+        'at most twice that speed',
+        'm/s',
+        low=0.0,
+        high=2.0,
+    )
+    aggregate_motion: str = setting(
+        'rotating',
+        'motion of beads that stick together: as rigid bodies that turn, or translating only, '
+        'without angular momentum',
+        choices=('rotating', 'translating'),
+    )
+    break_up_speed: float = setting(
+        0.0,
+        'normal speed of a contact above which the bead that is hit leaves its body; 0: never',
+        'm/s',
+        low=0.0,
+        high=10.0,
+    )
     tangential_restitution: float = setting(
         -1.0,
         'tangential restitution between beads; -1: smooth, 1: perfectly rough',

@@ -15,9 +15,14 @@ from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.simulation.engine import observables as columns
 from nanorocks_ros.simulation.engine.event_loop import RunOutput, run_until
+from nanorocks_ros.simulation.engine.flight.rigid_motion import new_motions
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, new_state
-from nanorocks_ros.simulation.engine.input_checks import check_room, check_times
+from nanorocks_ros.simulation.engine.input_checks import (
+    check_room,
+    check_times,
+    refuse_turning_in_drag,
+)
 from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN
 from nanorocks_ros.simulation.engine.rules.collision_rules import restitution_table
 from nanorocks_ros.simulation.initial_state import (
@@ -148,6 +153,8 @@ def _small_run(
     n_species = int(drawn.species.max()) + 1
     rules = rules._replace(restitution=restitution_table(rules.restitution, n_species))
     check_room(0.5 * drawn.diameter_high, rules)
+    if settings.drag > 0.0:
+        refuse_turning_in_drag(rules.rotating)
     purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
     keys = np.array([key_for(settings.seed, run, purpose) for purpose in purposes])
     ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))
@@ -160,6 +167,7 @@ def _small_run(
         keys,
         np.zeros((drawn.density.size, 2) if settings.drag > 0.0 else 0),
         gas_viscosity(settings, tray),
+        new_motions(drawn.density.size, rules),
         settings.mean_speed,
         settings.speeds == 'maxwellian',
         settings.vertical_speed_factor,
@@ -189,6 +197,7 @@ def _cool(
     keys: NDArray[np.uint64],
     drag: NDArray[np.float64],
     viscosity: float,
+    motions: NDArray[np.float64],
     mean_speed: float,
     maxwell: bool,
     vertical: float,
@@ -206,7 +215,7 @@ def _cool(
     masses = sphere_masses(diameters, ranges[2])
     set_drag(drag, diameters, ranges[2], viscosity)
     velocities = draw_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
-    state = new_state(positions, velocities, radii, masses, species, drag, rules)
+    state = new_state(positions, velocities, radii, masses, species, drag, motions, rules)
     nothing = np.empty((0, 0, 3))
     output = RunOutput(
         times[:0],

@@ -244,7 +244,14 @@ def after_shaking(
     if settings.speeds != 'shaken' or settings.mean_speed == 0.0:
         return started
     motion = wall_motion(settings)
-    apart = replace(rules, sticking_speed=0.0, wall_sticking_speed=0.0, motion=motion)
+    apart = replace(
+        rules,
+        sticking_speed=0.0,
+        sticking_speed_width=0.0,
+        wall_sticking_speed=0.0,
+        break_up_speed=0.0,
+        motion=motion,
+    )
     gas = HardSphereGas(started, apart)
     gas.run_until(motion.end)
     shaken = gas.beads()

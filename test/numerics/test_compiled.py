@@ -8,7 +8,10 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
+
 import nanorocks_ros
+from nanorocks_ros.numerics.compiled import compiled, kernel_where
 
 # What these processes import, installed or not.
 ROOT = Path(nanorocks_ros.__file__).parents[1]
@@ -145,3 +148,19 @@ def test_the_module_of_an_argument_may_be_moved(tmp_path):
     (package / 'before.py').rename(package / 'after.py')
     changed(package / 'caller.py', TAKER.format(module='after'))
     assert asked(tmp_path, ASK_TOTAL) == (7, 0)
+
+
+def test_a_kernel_for_some_types_is_a_constant_for_others():
+    """It is compiled for two axes alone: for one it would not even have a type."""
+
+    @kernel_where(lambda kind: kind.ndim == 2, otherwise=-1.0)
+    def corner(array):
+        return array[0, 0] + array.shape[1]
+
+    @compiled
+    def asked_for(array):
+        return corner(array)
+
+    assert asked_for(np.full((2, 3), 0.5)) == 3.5
+    assert asked_for(np.full(2, 0.5)) == -1.0
+    assert corner(np.full((2, 3), 0.5)) == 3.5

@@ -192,3 +192,55 @@ def test_friction_at_floor_and_lid_slows_a_gas_and_without_it_rough_beads_are_sm
     assert sliding[2] < 0.7 * sliding[1]
     free = last_speeds(**rough, friction=0.0, wall_friction=0.0)
     np.testing.assert_array_equal(free, last_speeds())
+
+
+@pytest.mark.parametrize('swings', [False, True])
+def test_beads_of_bodies_that_turn_are_where_the_bodies_put_them_in_every_frame(swings):
+    """Between events too: distances within a body stay the same while its beads circle."""
+    swing = WallMotion.sinusoidal((0.0005, 0.0, 0.0), 2.0, periods=20) if swings else None
+    settings = SimulationSettings(
+        first_shake=0.0, shake_period=60.0, sticking_speed=0.003, mean_speed=0.01
+    )
+    gas = ShakenTray(settings, TRAY, swing=swing)
+    kept = turned = 0
+    before, bodies = None, None
+    for moment in gas.moments(frames=600):
+        apart = moment.positions[:, np.newaxis] - moment.positions
+        distances = np.linalg.norm(apart, axis=2)
+        if bodies is not None:
+            together = bodies[:, np.newaxis] == bodies
+            np.testing.assert_allclose(distances[together], before[0][together], atol=1e-14)
+            kept += np.count_nonzero(together) - TRAY.count
+            turned += np.count_nonzero(np.abs(apart - before[1])[together] > 1e-5)
+        before, bodies = (distances, apart), gas.bodies
+    assert kept > 1000
+    assert turned > 1000
+    assert gas.counts.merge == TRAY.count - np.unique(gas.bodies).size
+
+
+def test_translating_bodies_can_be_chosen_and_rough_or_dragged_beads_need_them():
+    sticky = SimulationSettings(first_shake=0.0, sticking_speed=0.003)
+    for rule in ({'drag': 0.07}, {'tangential_restitution': 0.5}):
+        with pytest.raises(SimulationError, match='set aggregate_motion to translating'):
+            ShakenTray(replace(sticky, **rule), TRAY)
+        with pytest.raises(SimulationError, match='set aggregate_motion to translating'):
+            cooling_runs(replace(sticky, **rule), TRAY, [1.0], [0])
+        apart = ShakenTray(replace(sticky, **rule, aggregate_motion='translating'), TRAY)
+        apart.at(3.0)
+        assert apart.counts.merge > 0
+
+
+def test_the_bodies_of_an_ensemble_are_those_of_the_trays():
+    """Many runs in one kernel and single ones frame by frame: the same, with turning bodies."""
+    settings = SimulationSettings(
+        first_shake=0.0, sticking_speed=0.003, sticking_speed_width=0.004, break_up_speed=0.006
+    )
+    times = [1.0, 5.0, 20.0]
+    runs = cooling_runs(settings, TRAY, times, range(3))
+    for run in range(3):
+        gas = ShakenTray(settings, TRAY, run)
+        for k, time in enumerate(times):
+            _, velocities = gas.at(time)
+            assert runs.bodies[run, k] == np.unique(gas.bodies).size
+            speed = np.linalg.norm(velocities, axis=1).mean()
+            assert runs.mean_speed[run, k] == pytest.approx(speed, rel=1e-12)

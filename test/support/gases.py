@@ -22,7 +22,9 @@ KERNELS = [Kernel.SCAN, Kernel.LISTS]
 
 ROUGH = {'tangential_restitution': 0.5, 'wall_tangential_restitution': 0.2}
 
-# Every kind of rule, alone and combined.
+TRANSLATING = {'aggregate_motion': 'translating'}
+
+# Every kind of rule, alone and combined, but for bodies that turn.
 RULES = {
     'elastic': {},
     'inelastic': {'restitution': 0.8, 'wall_restitution': (0.9, 0.8, 0.7, 0.6, 0.95, 0.85)},
@@ -39,19 +41,31 @@ RULES = {
         'seed': 5,
     },
     'viscoelastic': {'restitution': ViscoelasticRestitution(value=0.8, at_speed=1.0)},
-    'sticking': {'restitution': 0.8, 'sticking_speed': 0.2, 'wall_restitution': 0.9},
+    'sticking': {
+        'restitution': 0.8,
+        'sticking_speed': 0.2,
+        'wall_restitution': 0.9,
+        **TRANSLATING,
+    },
     'sticking, total speed': {
         'restitution': 0.8,
         'sticking_speed': 0.8,
         'sticking_measure': 'total',
         'wall_restitution': 0.9,
+        **TRANSLATING,
     },
-    'sticking, periodic': {'periodic': ALWAYS, 'restitution': 0.9, 'sticking_speed': 0.3},
+    'sticking, periodic': {
+        'periodic': ALWAYS,
+        'restitution': 0.9,
+        'sticking_speed': 0.3,
+        **TRANSLATING,
+    },
     'sticking to walls': {
         'restitution': 0.9,
         'sticking_speed': 0.15,
         'wall_sticking_speed': 0.15,
         'wall_restitution': 0.95,
+        **TRANSLATING,
     },
     'rough': {'restitution': 0.9, 'wall_restitution': 0.9, **ROUGH},
     'rough and sliding': {
@@ -66,6 +80,7 @@ RULES = {
         'sticking_speed': 0.2,
         'wall_sticking_speed': 0.15,
         **ROUGH,
+        **TRANSLATING,
     },
     'contact duration': {
         'restitution': 0.3,
@@ -90,6 +105,39 @@ RULES = {
         **ROUGH,
     },
 }
+
+# Bodies that turn.
+TURNING = {
+    'turning': {'restitution': 0.8, 'sticking_speed': 0.4, 'wall_restitution': 0.9},
+    'turning, random threshold': {
+        'restitution': UniformRestitution(mean=0.7, width=0.4),
+        'sticking_speed': 0.4,
+        'sticking_speed_width': 0.8,
+        'sticking_measure': 'total',
+        'seed': 5,
+    },
+    'turning and stopping': {
+        'restitution': 0.9,
+        'sticking_speed': 0.3,
+        'wall_sticking_speed': 0.1,
+        'wall_restitution': 0.95,
+    },
+    'turning and shaken': {
+        'restitution': 0.9,
+        'sticking_speed': 0.3,
+        'wall_restitution': 0.9,
+        'motion': WallMotion.sinusoidal((0.3, 0.2, 0.0), 0.8, periods=4, start=0.5),
+    },
+}
+BREAKING = {
+    'turning and breaking': {
+        'restitution': 0.9,
+        'sticking_speed': 0.5,
+        'break_up_speed': 0.8,
+        'wall_restitution': 0.95,
+    },
+}
+ALL_RULES = RULES | TURNING | BREAKING
 
 
 def near(value, tolerance=1e-12):

@@ -82,6 +82,7 @@ def _events(runs: SimulatedRuns) -> str:
         'with walls': runs.count('wall'),
         'merges': runs.count('merge'),
         'stuck to a wall': runs.count('fix'),
+        'break-ups': runs.count('break_up'),
     }
     parts = ', '.join(f'{count} {name}' for name, count in kinds.items() if count)
     return f'{runs.events}' + (f' ({parts})' if parts else '')

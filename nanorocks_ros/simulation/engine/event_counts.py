@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.simulation.engine.gas_state import (
+    BREAK_UP,
     ELASTIC_PAIR,
     ELASTIC_WALL,
     FIX,
@@ -39,6 +40,8 @@ class EventCounts:
     stale, missed, renewed : int
         Events taken but void: the partner had moved on, or a graze rounded to a miss; lists
         renewed.
+    break_up : int
+        Beads that a contact released from their body.
     """
 
     pair: int
@@ -50,6 +53,7 @@ class EventCounts:
     stale: int
     missed: int
     renewed: int
+    break_up: int
 
     @classmethod
     def of(cls, counts: NDArray[np.int64]) -> EventCounts:
@@ -68,4 +72,5 @@ _PLACES = {
     'stale': STALE,
     'missed': MISSED,
     'renewed': RENEWED,
+    'break_up': BREAK_UP,
 }

@@ -12,9 +12,16 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import inlined, kernel
 from nanorocks_ros.simulation.engine.collision.aggregates import advance
 from nanorocks_ros.simulation.engine.collision.bead_collisions import collide_pair
+from nanorocks_ros.simulation.engine.collision.rigid_collisions import renew_stretch
 from nanorocks_ros.simulation.engine.collision.wall_collisions import bounce_off_wall
 from nanorocks_ros.simulation.engine.event_prediction import predict
 from nanorocks_ros.simulation.engine.event_queue import earliest
+from nanorocks_ros.simulation.engine.flight.rigid_motion import (
+    is_turning,
+    shift_motions,
+    turns,
+)
+from nanorocks_ros.simulation.engine.flight.rotation_series import is_at_end
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,
     DONE,
@@ -97,6 +104,8 @@ def execute_event(state: State, rules: Rules, i: int, now: float) -> int:
     partner = as_int64(state.links[i, PARTNER])
     state.last[0] = 0.0
     if partner == RENEW:
+        if is_turning(state) and turns(state, i) and is_at_end(state, i, now):
+            return renew_stretch(state, i, now)
         if state.references.shape[0] and not renew(state, rules, i, now):
             return FULL
     elif partner >= 0 and state.links[partner, COUNTER] != state.links[i, PARTNER_COUNTER]:
@@ -149,6 +158,8 @@ def advance_epoch(state: State) -> None:
         state.times[k] -= quantum
     for k in range(state.contacts.shape[0]):
         state.contacts[k, 2] -= quantum
+    if is_turning(state):
+        shift_motions(state, quantum)
     state.clock[EPOCH] += quantum
 
 

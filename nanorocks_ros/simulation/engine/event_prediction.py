@@ -21,6 +21,12 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     velocity_at,
 )
 from nanorocks_ros.simulation.engine.flight.pair_times import square_of, wait_for_contact
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turns
+from nanorocks_ros.simulation.engine.flight.turning_contacts import (
+    end_of_stretch,
+    shell_exit_of_turning,
+    wait_with_turning,
+)
 from nanorocks_ros.simulation.engine.flight.unequal_drag import wait_with_unequal_drag
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,
@@ -37,8 +43,8 @@ from nanorocks_ros.simulation.engine.gas_state import (
 from nanorocks_ros.simulation.engine.integer_width import as_index, as_int64
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.collision.conservation_ledger import Vector
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.vectors import Vector
 
 _ALL = 63
 
@@ -70,6 +76,8 @@ def wait_for_pair(
     limit : float, [s]
         Later contacts may be left out.
     """
+    if is_turning(state) and (turns(state, i) or turns(state, j)):
+        return wait_with_turning(state, rules, i, j, now, limit)
     place = position_at(state, j, now)
     velocity = velocity_at(state, j, now)
     flights = flight[0], flight[1], place, velocity
@@ -113,6 +121,11 @@ def predict_among_all(state: State, rules: Rules, i: int, now: float, folded: bo
         if horizon < best:
             best = horizon
             partner = RENEW
+    if is_turning(state):
+        horizon = end_of_stretch(state, i)
+        if horizon < best:
+            best = horizon
+            partner = RENEW
     flight = position_at(state, i, now), velocity_at(state, i, now)
     for j in range(state.rows.shape[0]):
         if j != i:
@@ -129,7 +142,10 @@ def predict_among_neighbours(state: State, rules: Rules, i: int, now: float) -> 
     flight = position_at(state, i, now), velocity_at(state, i, now)
     near = state.links[i, FLAGS] & NEAR
     partner = RENEW
-    best = shell_exit(state, i, now, flight)
+    if is_turning(state) and turns(state, i):
+        best = shell_exit_of_turning(state, i, now)
+    else:
+        best = shell_exit(state, i, now, flight)
     if near:
         wall_time, wall = next_wall_event(state, rules, i, now, near)
         if wall_time < best:

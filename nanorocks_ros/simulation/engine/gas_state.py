@@ -26,7 +26,7 @@ X, Y, Z, VX, VY, VZ, TIME, RADIUS = range(8)
 COUNTER, PARTNER, PARTNER_COUNTER, FLAGS, ORIGINAL, SLOT = range(6)
 
 # Columns of State.bodies.
-BODY, FOLLOWING = range(2)
+BODY, FOLLOWING, BOND, BONDED = range(4)
 
 # State.links[:, FLAGS]: two bits for each axis whose walls or edges are near, then the species.
 NEAR = 63
@@ -40,12 +40,12 @@ WALLS = 6
 RENEW = -1 - WALLS
 
 # Places in State.counts.
-PAIR, WALL, MERGE, FIX, ELASTIC_PAIR, ELASTIC_WALL, STALE, MISSED, RENEWED = range(9)
-COUNTS = 9
+PAIR, WALL, MERGE, FIX, ELASTIC_PAIR, ELASTIC_WALL, STALE, MISSED, RENEWED, BREAK_UP = range(10)
+COUNTS = 10
 
 # Places in State.ledger: energy lost; normal momentum given to each wall; momentum and angular
-# momentum given to walls and to what sticks to them; angular momentum taken by aggregates,
-# which cannot turn.
+# momentum given to walls and to what sticks to them; angular momentum taken by aggregates that
+# cannot turn, and by the spin that smooth beads lose when they leave one.
 PAIR_LOSS, WALL_LOSS, MERGE_LOSS, WALL_IMPULSE = 0, 1, 2, 3
 MOMENTUM, SPIN, AGGREGATE_SPIN = 9, 12, 15
 LEDGER_SIZE = 18
@@ -59,6 +59,9 @@ KIND, SPEED, IMPULSE = range(3)
 # Places in State.reach.
 LARGEST_RADIUS, HALF_SKIN, PER_CELL, CELLS, AHEAD = 0, 1, 2, 5, 8
 REACHES = 9
+
+# Moment of inertia of a solid sphere: 2/5 m r^2.
+INERTIA = 0.4
 
 # An epoch lasts about this many crossings of the box.
 _CROSSINGS = 64.0
@@ -81,15 +84,19 @@ class State(NamedTuple):
         of that partner when the event was predicted (an event is stale when its partner has
         moved on); flags; number of the bead as given (lists keep neighbours in space close in
         memory); its place in its cell of space.
-    bodies : ndarray of int32, (n, 2) or (0, 2)
+    bodies : ndarray of int32, (n, 4) or (0, 4)
         With sticking: the smallest given number in the body of each bead, and the next bead of
-        the body, round and round.
+        the body, round and round. Of bodies that turn also the bonds, two beads each, in any
+        row; -1 where there is none.
     times : ndarray, [s]
     levels : ndarray of int64
         The queue.
     drag : ndarray (0,) or (n, 2), [1/s]
         Without drag, or with it: decay rate of the velocity of each bead, and of its body. The
         number of axes tells the compiler which.
+    motions : ndarray (0,) or (n + 2, columns)
+        Without bodies that turn, or with them: see `flight.rigid_motion`. The number of axes
+        tells the compiler which.
     masses : ndarray (n, 1) or (n, 2), [kg]
         Of each bead; with sticking also of the body of that number, infinite when it is stuck
         to a wall.
@@ -116,7 +123,7 @@ class State(NamedTuple):
     last : ndarray (3,)
         The last collision: its kind (a place in `counts`, plus 1), normal relative speed [m/s]
         and impulse [kg m/s].
-    counts : ndarray of int64, (9,)
+    counts : ndarray of int64, (10,)
         Events by type.
     ledger : ndarray (18,)
         Energy [J], momentum [kg m/s] and angular momentum [kg m^2/s] that left the beads.
@@ -128,6 +135,7 @@ class State(NamedTuple):
     times: NDArray[np.float64]
     levels: NDArray[np.int64]
     drag: NDArray[np.float64]
+    motions: NDArray[np.float64]
     masses: NDArray[np.float64]
     spins: NDArray[np.float64]
     images: NDArray[np.int32]
@@ -151,6 +159,7 @@ def new_state(
     masses: NDArray[np.float64],
     species: NDArray[np.int32],
     drag: NDArray[np.float64],
+    motions: NDArray[np.float64],
     rules: Rules,
 ) -> State:
     """State at time 0, without lists and without predicted events.
@@ -161,6 +170,7 @@ def new_state(
     radii, masses : ndarray (n,), [m], [kg]
     species : ndarray of int32, (n,)
     drag : ndarray (0,) or (n, 2), [1/s]
+    motions : ndarray (0,) or (n + 2, columns)
         See `State`.
     rules : Rules
     """
@@ -176,7 +186,7 @@ def new_state(
     times, levels = new_queue(n)
     periodic = rules.periodic[0] or rules.periodic[1] or rules.periodic[2]
     links = np.zeros((n, 6), dtype=np.int32)
-    bodies = np.zeros((n if rules.sticky else 0, 2), dtype=np.int32)
+    bodies = np.full((n if rules.sticky else 0, 4), -1, dtype=np.int32)
     for i in range(bodies.shape[0]):
         bodies[i, BODY] = i
         bodies[i, FOLLOWING] = i
@@ -194,6 +204,7 @@ def new_state(
         times,
         levels,
         drag,
+        motions,
         weights,
         np.zeros((n if rules.rough else 0, 3)),
         np.zeros((n if periodic else 0, 3), dtype=np.int32),

@@ -17,6 +17,7 @@ from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     EPOCH,
     FLAGS,
+    INERTIA,
     NOW,
     ORIGINAL,
     SPECIES,
@@ -88,11 +89,43 @@ class GasView:
         """Energy, momentum and angular momentum that left the beads, (18,), SI.
 
         Energy lost in pair collisions, at walls (gained from moving walls: negative) and in
-        merges; normal momentum given to each of the six walls; momentum and angular momentum
-        about the origin given to walls and to what sticks to them; angular momentum taken by
-        aggregates, which cannot turn. Angular momentum is booked for rough and sticky beads.
+        merges and break-ups; normal momentum given to each of the six walls; momentum and angular
+        momentum about the origin given to walls and to what sticks to them; angular momentum
+        taken by aggregates that cannot turn, and by smooth beads that leave one that turns and
+        lose their spin. Angular momentum is booked for rough and sticky beads.
         """
         return self._state.ledger.copy()
+
+    @property
+    def spins(self) -> NDArray[np.float64]:
+        """Angular velocity of each bead, (n, 3), [rad/s].
+
+        Of rough beads; of beads of bodies that turn, that of the body; otherwise 0.
+        """
+        n = self._state.rows.shape[0]
+        positions, velocities, spins = np.empty((3, n, 3))
+        snapshot(self._state, self._rules, positions, velocities, spins)
+        return spins
+
+    @property
+    def energy(self) -> float:
+        """Kinetic energy of all beads, of translation and rotation, [J]."""
+        spins, v = self.spins, self.beads().velocities
+        inertias = INERTIA * self.masses * self.radii**2
+        return float(0.5 * (self.masses @ (v * v).sum(axis=1) + inertias @ (spins**2).sum(axis=1)))
+
+    @property
+    def momentum(self) -> NDArray[np.float64]:
+        """Momentum of all beads, (3,), [kg m/s]."""
+        return np.asarray(self.masses @ self.beads().velocities)
+
+    @property
+    def angular_momentum(self) -> NDArray[np.float64]:
+        """Angular momentum of all beads about the origin, (3,), [kg m^2/s]."""
+        beads = self.beads()
+        inertias = INERTIA * self.masses * self.radii**2
+        orbital = np.cross(beads.positions, self.masses[:, np.newaxis] * beads.velocities)
+        return np.asarray(orbital.sum(axis=0) + inertias @ self.spins)
 
     @property
     def bytes_per_bead(self) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.simulation.engine.flight.rigid_motion import new_motions
 from nanorocks_ros.simulation.engine.gas_state import BODY, ORIGINAL, new_state
 from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
     list_skin,
@@ -78,6 +79,7 @@ def arranged_state(
         masses[order],
         species[order],
         drag[order] if drag.size else drag,
+        new_motions(radii.size, rules),
         rules,
     )
     state.links[:, ORIGINAL] = order

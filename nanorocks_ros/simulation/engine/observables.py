@@ -14,6 +14,7 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     spin_left,
     velocity_at,
 )
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTS,
@@ -62,11 +63,17 @@ def write_frame(
     positions, velocities : ndarray (n, 3), [m], [m/s]
         Written, by original number; positions continuous across periodic sides.
     spins : ndarray (n, 3) or (0, 3), [rad/s]
+        Of rough beads, and of beads of bodies that turn; (n, 3) where there can be any.
     bodies : ndarray of int32, (n,) or (0,)
     """
     rows = state.rows
     for i in range(rows.shape[0]):
         number = as_int64(state.links[i, ORIGINAL])
+        if bodies.shape[0]:
+            bodies[number] = state.bodies[i, BODY]
+        if is_turning(state) and turns(state, i):
+            write_turned_bead(state, i, time, positions[number], velocities[number], spins)
+            continue
         since = time - rows[i, TIME]
         flown = flown_time(state, i, since)
         left = speed_left(state, i, since)
@@ -79,9 +86,37 @@ def write_frame(
         if spins.shape[0]:
             left = spin_left(state, i, since)
             for axis in range(3):
-                spins[number, axis] = state.spins[i, axis] * left
-        if bodies.shape[0]:
-            bodies[number] = state.bodies[i, BODY]
+                spins[number, axis] = state.spins[i, axis] * left if state.spins.shape[0] else 0.0
+
+
+@inlined
+def write_turned_bead(
+    state: State,
+    i: int,
+    time: float,
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    spins: NDArray[np.float64],
+) -> None:
+    """Write place, velocity and spin of a bead of a body that turns, see `write_frame`.
+
+    Parameters
+    ----------
+    state : State
+    i : int
+    time : float, [s]
+    position, velocity : ndarray (3,), [m], [m/s]
+        Written.
+    spins : ndarray (n, 3) or (0, 3), [rad/s]
+        Written in the row of the bead's number, if there is one.
+    """
+    place, flying, spin = turned_bead(state, i, time)
+    number = as_int64(state.links[i, ORIGINAL])
+    for axis in range(3):
+        position[axis] = place[axis]
+        velocity[axis] = flying[axis]
+        if spins.shape[0]:
+            spins[number, axis] = spin[axis]
 
 
 @inlined

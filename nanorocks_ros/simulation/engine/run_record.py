@@ -97,7 +97,8 @@ class RunRecord:
     positions, velocities : ndarray (n_frames, n, 3), [m], [m/s]
         Positions are continuous across periodic sides.
     spins : ndarray (n_frames, n, 3) or None, [rad/s]
-        None for smooth beads.
+        None for smooth beads without bodies that turn. In these, each bead has the spin of its
+        body; single ones have none.
     bodies : ndarray of int32, (n_frames, n), or None
         The smallest number of a bead in the body of each bead; None when nothing sticks.
     observations : Observations
@@ -130,12 +131,12 @@ class RunRecorder:
     ) -> None:
         n = state.rows.shape[0]
         frames = frame_times.size
-        self._rough, self._sticky = rules.rough, rules.sticky
+        self._spinning, self._sticky = rules.rough or rules.rotating, rules.sticky
         self.output = RunOutput(
             frame_times=frame_times,
             positions=np.empty((frames, n, 3)),
             velocities=np.empty((frames, n, 3)),
-            spins=np.empty((frames, n if rules.rough else 0, 3)),
+            spins=np.empty((frames, n if self._spinning else 0, 3)),
             bodies=np.empty((frames, n if rules.sticky else 0), dtype=np.int32),
             observation_times=observation_times,
             observations=np.empty((observation_times.size, columns.columns(n_species))),
@@ -155,7 +156,7 @@ class RunRecorder:
             times=output.frame_times,
             positions=output.positions,
             velocities=output.velocities,
-            spins=output.spins if self._rough else None,
+            spins=output.spins if self._spinning else None,
             bodies=output.bodies if self._sticky else None,
             observations=_observations(output.observation_times, output.observations),
             events=_events(output.events[: output.done[EVENTS]]),

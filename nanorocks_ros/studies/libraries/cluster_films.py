@@ -241,6 +241,8 @@ def _settings(
         # A different gas for every run and every seed.
         'seed': int(np.random.SeedSequence((plan.seed, run)).generate_state(1)[0] >> 1),
         'sticking_speed': drawn.sticking_speed,
+        # As in the packaged calibration: its points can be made again.
+        'aggregate_motion': 'translating',
         'first_shake': _FIRST_SHAKE,
         'shake_period': 10.0 * TIMES[-1],
     }

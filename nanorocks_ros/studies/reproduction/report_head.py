@@ -39,9 +39,10 @@ _LIMITS = (
     ('Table 3 by hand, and the grains of trays 6 to 8 in it', 'Counted here from the truth and '
      'from tracks. Grains are too many to be tracked in trays 6 and 8; the number that the paper '
      'assumes is not printed and was computed from its table.'),
-    ('Several clusters at the end of a cycle (Table 3, Figure 8e)', 'Simulated clusters neither '
-     'break nor come to rest, so that nearly all beads end in one or two; what kept them apart in '
-     'flight (walls, gas, charge, the swinging tray) is not known.'),
+    ('Several clusters at the end of a cycle (Table 3, Figure 8e)', 'Clusters of the campaign '
+     'neither break nor stick to walls, so that nearly all beads end in one or two. What kept '
+     'them apart in flight is not known: walls that hold slow beads would '
+     '(docs/method/clusters.md), but also gas, charge or the swinging tray.'),
     ('Autocorrelation of trays 2 and 4', 'The paper got no result under chalk either; ours is in '
      'the tables with its status.'),
     ('Dates and periods of larger clusters (Figure 9)', 'The experiment kept no absolute time; '

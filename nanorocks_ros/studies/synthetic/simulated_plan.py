@@ -101,8 +101,8 @@ class SimulationPlan:
             For more than `MAX_VALUES` numbers.
         """
         moments = self.samples * self.runs
-        rough = rules_of(self.settings, self.tray).compiled().rough
-        bead = self.tray.count * (_BEAD + (_SPIN if rough else 0))
+        rules = rules_of(self.settings, self.tray).compiled()
+        bead = self.tray.count * (_BEAD + (_SPIN if rules.rough or rules.rotating else 0))
         kept = moments if self.trajectory else self.bead_times(0).size
         values = moments * _CURVES + kept * bead
         if values > MAX_VALUES:

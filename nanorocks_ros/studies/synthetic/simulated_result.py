@@ -38,7 +38,7 @@ class SimulatedRun:
     positions, velocities : ndarray (n_kept, n, 3), [m], [m/s]
         At the times of `SimulationPlan.bead_times`.
     spins : ndarray (n_kept, n, 3) or None, [rad/s]
-        None for smooth beads.
+        As of `RunRecord`; None for smooth beads without bodies that turn.
     body : ndarray of int32, (n_kept, n)
         Body of each bead: the smallest bead number in it.
     events : structured ndarray (n_events,)

@@ -44,10 +44,10 @@ def write_trajectory(path: Path, simulated: SimulatedRuns) -> None:
     path : Path
         ``.npz``: arrays `times` (samples,), `runs`, `box` (3,), and for each bead `ids`,
         `species`, `materials`, `radii`, `masses`, `positions` and `velocities`
-        (samples, n, 3), `spins` of rough beads, `body` (samples, n), the smallest number of
-        a bead that moves with this one, `drag` (n,) in a gas that slows beads. With several
-        runs, arrays that differ between runs have them as first axis. ``.parquet``: a row for
-        each bead at each time of each run.
+        (samples, n, 3), `spins` of rough beads and where bodies turn, `body` (samples, n), the
+        smallest number of a bead that moves with this one, `drag` (n,) in a gas that slows
+        beads. With several runs, arrays that differ between runs have them as first axis.
+        ``.parquet``: a row for each bead at each time of each run.
         Either holds `provenance`, as JSON; units are SI.
     simulated : SimulatedRuns
         Of a plan that keeps the trajectory.

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gases import ALWAYS, BOX, KERNELS, RULES, Beads, placed
+from gases import ALL_RULES, ALWAYS, BOX, KERNELS, Beads, placed
 
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
@@ -41,7 +41,7 @@ def beads_for(rules, n=20):
 
 def fingerprint(name, kernel):
     box = tuple(1.5 * side for side in BOX)
-    rules = CollisionRules(box=box, **RULES[name])
+    rules = CollisionRules(box=box, **ALL_RULES[name])
     record = HardSphereGas(beads_for(rules), rules, kernel).follow(30.0, [30.0])
     return tuple(
         zlib.crc32(np.ascontiguousarray(array).tobytes())
@@ -56,7 +56,7 @@ def test_trajectories_match_stored_checksums(name):
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-@pytest.mark.parametrize('name', RULES)
+@pytest.mark.parametrize('name', ALL_RULES)
 def test_two_runs_are_bit_identical(name, kernel):
     assert fingerprint(name, kernel) == fingerprint(name, kernel)
 

@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from gases import BOX, KERNELS, RULES, mixture
+from gases import ALL_RULES, BOX, KERNELS, RULES, mixture
 
 from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
@@ -20,7 +20,7 @@ TIMES = np.linspace(HALF, END, 12)
 
 def gas_for(name, kernel=Kernel.SCAN, n=20):
     box = tuple(1.4 * side for side in BOX)
-    rules = CollisionRules(box=box, **RULES[name])
+    rules = CollisionRules(box=box, **ALL_RULES[name])
     return HardSphereGas(mixture(8, n, rules), rules, kernel)
 
 
@@ -42,7 +42,7 @@ def assert_identical(first, second):
 
 
 @pytest.mark.parametrize('kernel', KERNELS)
-@pytest.mark.parametrize('name', RULES)
+@pytest.mark.parametrize('name', ALL_RULES)
 def test_a_loaded_gas_continues_bit_by_bit(tmp_path, name, kernel):
     path = tmp_path / 'gas.npz'
     straight = gas_for(name, kernel)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gases import (
+    ALL_RULES,
     ALWAYS,
     BOX,
     KERNELS,
-    RULES,
     angular_momentum,
     energy,
     gas_of,
@@ -36,10 +36,10 @@ def pair_of_gases(beads, rules, kernel, quantum=OFTEN):
 
 
 @pytest.mark.parametrize('quantum', [2.0**-10, OFTEN, 0.125])
-@pytest.mark.parametrize('name', RULES)
+@pytest.mark.parametrize('name', ALL_RULES)
 def test_trajectories_agree_until_chaos(kernel, name, quantum):
     """With events much rarer than time is counted anew, as rare, and more frequent."""
-    rules = CollisionRules(box=BOX, **RULES[name])
+    rules = CollisionRules(box=BOX, **ALL_RULES[name])
     gas, often = pair_of_gases(mixture(9, 10, rules), rules, kernel, quantum)
     events = gas.follow(40.0, log=True).events[:25]
     end = 0.5 * (events['time'][-1] + events['time'][-2])

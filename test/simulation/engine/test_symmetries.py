@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gases import ALWAYS, BOX, KERNELS, RULES, mixture, placed
+from gases import ALL_RULES, ALWAYS, BOX, KERNELS, RULES, mixture, placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +23,7 @@ EVENTS = 20
 CHAOS = 1e-6
 
 seeds = st.integers(0, 10**6)
-names = st.sampled_from(sorted(RULES))
+names = st.sampled_from(sorted(ALL_RULES))
 few = settings(deadline=None, max_examples=25, derandomize=True)
 
 
@@ -82,7 +82,7 @@ def turned(beads, rules, matrix, shift):
 @few
 @given(name=names, seed=seeds, order=st.permutations(range(3)))
 def test_permuted_axes_permute_the_trajectories(kernel, name, seed, order):
-    rules = CollisionRules(box=BOX, **RULES[name])
+    rules = CollisionRules(box=BOX, **ALL_RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.eye(3)[list(order)]
     end, record = gas_and_record(beads, rules, kernel)
@@ -93,7 +93,7 @@ def test_permuted_axes_permute_the_trajectories(kernel, name, seed, order):
 @few
 @given(name=names, seed=seeds, signs=st.tuples(*[st.sampled_from([1.0, -1.0])] * 3))
 def test_a_mirrored_gas_has_mirrored_trajectories(kernel, name, seed, signs):
-    rules = CollisionRules(box=BOX, **RULES[name])
+    rules = CollisionRules(box=BOX, **ALL_RULES[name])
     beads = mixture(seed, BEADS, rules)
     matrix = np.diag(signs)
     shift = np.where(np.array(signs) < 0, BOX, 0.0)
@@ -163,7 +163,9 @@ def scaled(beads, rules, length, time, mass):
         restitution=law,
         contact_duration=rules.contact_duration * time,
         sticking_speed=rules.sticking_speed * speed,
+        sticking_speed_width=rules.sticking_speed_width * speed,
         wall_sticking_speed=rules.wall_sticking_speed * speed,
+        break_up_speed=rules.break_up_speed * speed,
         motion=motion,
     )
     beads = replace(
@@ -177,10 +179,10 @@ def scaled(beads, rules, length, time, mass):
     return beads, rules
 
 
-@pytest.mark.parametrize('name', RULES)
+@pytest.mark.parametrize('name', ALL_RULES)
 def test_units_that_are_powers_of_two_change_no_bit(kernel, name):
     """Millimetres, hours or tons: nothing in the engine is of any size by itself."""
-    rules = CollisionRules(box=BOX, **RULES[name])
+    rules = CollisionRules(box=BOX, **ALL_RULES[name])
     beads = mixture(1, BEADS, rules)
     times = np.linspace(0.0, 20.0, 11)
     record = HardSphereGas(beads, rules, kernel).follow(20.0, times, log=True)

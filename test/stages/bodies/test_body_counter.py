@@ -112,7 +112,9 @@ def test_adjacent_beads_at_rest_are_no_body():
     assert counts[-1].weighted_size.value == 1.0
 
 
-def test_an_occluded_bead_stays_in_its_body_and_keeps_its_number(sticky):
+def test_an_occluded_bead_stays_in_its_body_and_keeps_its_number():
+    """In bodies that do not turn: it reappears where it was beside the others."""
+    sticky = list(_gas(5e-3, 12.0, aggregate_motion='translating'))
     _, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     lost = int(merges[0].tracks[1])
     from_ns, to_ns = merges[0].known_ns + 1 * NS, merges[0].known_ns + 4 * NS

@@ -23,7 +23,12 @@ from nanorocks_ros.studies.analysis.cluster_packing import (
 
 TRAY = load_trays()[1]
 STICKING = SimulationSettings(
-    wall_restitution=0.97, mean_speed=0.010, sticking_speed=0.0104, shake_period=20.0, seed=2
+    wall_restitution=0.97,
+    mean_speed=0.010,
+    sticking_speed=0.0104,
+    aggregate_motion='translating',
+    shake_period=20.0,
+    seed=2,
 )
 
 

@@ -1,4 +1,4 @@
-"""Rigid bodies of beads that stick together and do not rotate."""
+"""Rigid bodies of beads that stick together: who belongs to them, and what all of them share."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     speed_left,
     spin_left,
 )
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTER,
@@ -41,6 +42,13 @@ if TYPE_CHECKING:
 def advance(state: State, i: int, now: float) -> None:
     """Move a bead in free flight to a time."""
     rows = state.rows
+    if is_turning(state) and turns(state, i):
+        place, velocity, _ = turned_bead(state, i, now)
+        for axis in range(3):
+            rows[i, X + axis] = place[axis]
+            rows[i, VX + axis] = velocity[axis]
+        rows[i, TIME] = now
+        return
     since = now - rows[i, TIME]
     flown = flown_time(state, i, since)
     rows[i, X] += rows[i, VX] * flown
@@ -89,7 +97,7 @@ def velocity_share(own: float, other: float) -> float:
 
 @inlined
 def propagate_velocity(state: State, rules: Rules, i: int, now: float, marked: int) -> int:
-    """Give the new velocity of a bead to its whole body, and mark its beads.
+    """Give the new velocity of a bead to its body, which does not turn, and mark its beads.
 
     Parameters
     ----------
@@ -121,6 +129,45 @@ def propagate_velocity(state: State, rules: Rules, i: int, now: float, marked: i
             marked += 1
             k = as_int64(state.bodies[k, FOLLOWING])
     return marked
+
+
+@inlined
+def mark_body(state: State, i: int, marked: int) -> int:
+    """Mark the beads of a body; returns the number marked now."""
+    k = i
+    while True:
+        state.dirty[marked] = k
+        marked += 1
+        k = as_int64(state.bodies[k, FOLLOWING])
+        if k == i:
+            return marked
+
+
+@inlined
+def mark_changed_body(state: State, i: int, marked: int) -> int:
+    """Mark the beads of a body whose velocities change; returns the number marked now."""
+    last = mark_body(state, i, marked)
+    for k in range(marked, last):
+        state.links[state.dirty[k], COUNTER] += 1
+    return last
+
+
+@inlined
+def advance_marked(state: State, marked: int, now: float) -> None:
+    """Move all marked beads to a time."""
+    for k in range(marked):
+        advance(state, as_int64(state.dirty[k]), now)
+
+
+@inlined
+def advance_body(state: State, i: int, now: float) -> None:
+    """Move all beads of a body to a time."""
+    k = i
+    while True:
+        advance(state, k, now)
+        k = as_int64(state.bodies[k, FOLLOWING])
+        if k == i:
+            break
 
 
 @inlined

@@ -8,40 +8,47 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.aggregates import (
     advance,
+    advance_body,
     join_bodies,
     mass_of,
     propagate_velocity,
     velocity_share,
 )
 from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
-    Vector,
     add_vector,
     angular_momentum,
     book_lost_torque,
     energy_of,
-    length,
+)
+from nanorocks_ros.simulation.engine.collision.contact_laws import (
+    is_same_contact,
+    pair_restitution,
+    sticking_threshold,
 )
 from nanorocks_ros.simulation.engine.collision.friction import apply_pair_friction
+from nanorocks_ros.simulation.engine.collision.rigid_bodies import velocity_of_body
+from nanorocks_ros.simulation.engine.collision.rigid_collisions import (
+    collide_rigid_bodies,
+    merge_rigid_bodies,
+)
 from nanorocks_ros.simulation.engine.flight.gas_drag import is_dragged
 from nanorocks_ros.simulation.engine.flight.pair_times import (
     is_rounding,
     minimum_image,
     speed_square,
 )
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turns
 from nanorocks_ros.simulation.engine.flight.unequal_drag import is_apart, with_least_separation
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,
-    COUNTER,
     ELASTIC_PAIR,
-    FLAGS,
+    IMPULSE,
     MERGE,
     MERGE_LOSS,
     MOMENTUM,
-    ORIGINAL,
     PAIR,
     PAIR_LOSS,
     RADIUS,
-    SPECIES,
     SPIN,
     VX,
     VY,
@@ -52,43 +59,19 @@ from nanorocks_ros.simulation.engine.gas_state import (
     Z,
     record_collision,
 )
-from nanorocks_ros.simulation.engine.integer_width import as_int64
-from nanorocks_ros.simulation.engine.recent_contacts import is_repeated
-from nanorocks_ros.simulation.engine.rules.restitution_laws import (
-    CONSTANT,
-    UNIFORM,
-    random_restitution,
-    restitution_at,
-)
+from nanorocks_ros.simulation.engine.vectors import length
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.vectors import Vector
 
 _SMOOTH = -1.0
 
 
 @inlined
-def pair_restitution(state: State, rules: Rules, i: int, j: int, speed: float) -> float:
-    """Restitution of two beads that approach with a normal speed."""
-    if rules.kind == CONSTANT:
-        a, b = state.links[i, FLAGS] >> SPECIES, state.links[j, FLAGS] >> SPECIES
-        return float(rules.restitution[a, b])
-    if rules.kind == UNIFORM:
-        a, b = i, j
-        if state.links[a, ORIGINAL] > state.links[b, ORIGINAL]:
-            a, b = b, a
-        beads = as_int64(state.links[a, ORIGINAL]), as_int64(state.links[b, ORIGINAL])
-        counts = as_int64(state.links[a, COUNTER]), as_int64(state.links[b, COUNTER])
-        return random_restitution(rules.first, rules.second, rules.seed_key, beads, counts)
-    return float(restitution_at(rules.kind, rules.first, rules.second, rules.exponent, speed))
-
-
-@inlined
-def is_same_contact(state: State, rules: Rules, i: int, j: int, now: float) -> bool:
-    """Whether this pair touched less than the contact duration ago."""
-    a = as_int64(state.links[i, ORIGINAL])
-    b = as_int64(state.links[j, ORIGINAL])
-    return is_repeated(state.contacts, min(a, b), max(a, b), now, rules.contact_duration)
+def is_stuck(state: State, rules: Rules, i: int) -> bool:
+    """Whether a bead is stuck to a wall."""
+    return math.isinf(mass_of(state, rules, i))
 
 
 @inlined
@@ -108,10 +91,11 @@ def book_merging_body(state: State, rules: Rules, i: int, stuck: bool, now: floa
     if not stuck:
         add_vector(state, AGGREGATE_SPIN, turning)
         return
-    rows = state.rows
     mass = mass_of(state, rules, i)
     add_vector(state, SPIN, turning)
-    add_vector(state, MOMENTUM, (mass * rows[i, VX], mass * rows[i, VY], mass * rows[i, VZ]))
+    velocity = velocity_of_body(state, i)
+    add_vector(state, MOMENTUM, (mass * velocity[0], mass * velocity[1], mass * velocity[2]))
+    state.last[IMPULSE] = mass * length(velocity)
 
 
 @inlined
@@ -122,6 +106,9 @@ def merge(state: State, rules: Rules, i: int, j: int, now: float) -> int:
     free_j = not math.isinf(mass_of(state, rules, j))
     before = energy_of(state, rules, i) + energy_of(state, rules, j)
     stuck = not (free_i and free_j)
+    if is_turning(state):
+        advance_body(state, i, now)
+        advance_body(state, j, now)
     if free_i:
         book_merging_body(state, rules, i, stuck, now)
     if free_j:
@@ -140,6 +127,28 @@ def merge(state: State, rules: Rules, i: int, j: int, now: float) -> int:
     state.ledger[MERGE_LOSS] += before - energy_of(state, rules, i)
     state.counts[MERGE] += 1
     return marked
+
+
+@inlined
+def merge_touching(
+    state: State, rules: Rules, i: int, j: int, now: float, speeds: tuple[float, float]
+) -> int:
+    """Merge the bodies of two beads that touch; returns the number of marked beads.
+
+    Parameters
+    ----------
+    state : State
+    rules : Rules
+    i, j : int
+    now : float, [s]
+    speeds : tuple of 2 floats, [m/s]
+        Of the approach, along the normal and in total.
+    """
+    stuck = is_stuck(state, rules, i) or is_stuck(state, rules, j)
+    if is_turning(state) and not stuck:
+        return merge_rigid_bodies(state, rules, i, j, now, speeds[0])
+    record_collision(state, MERGE, speeds[0], reduced_mass(state, rules, i, j) * speeds[1])
+    return merge(state, rules, i, j, now)
 
 
 @inlined
@@ -165,17 +174,17 @@ def collide_pair(state: State, rules: Rules, i: int, j: int, now: float) -> int:
     speeds = speed_square(rows, i), speed_square(rows, j)
     if approach >= 0.0 or is_rounding(approach, square, speeds[0], speeds[1]):
         return 0
-    if is_dragged(state) and is_apart(rows[i, RADIUS] + rows[j, RADIUS], square):
+    bent = is_dragged(state) or is_turning(state)
+    if bent and is_apart(rows[i, RADIUS] + rows[j, RADIUS], square):
         return 0
     distance = math.sqrt(square)
     closing = approach / distance
     elastic = is_same_contact(state, rules, i, j, now)
     if rules.sticky and rules.sticking_speed > 0.0:
-        measure = math.sqrt(ux * ux + uy * uy + uz * uz) if rules.total_measure else -closing
-        if measure < rules.sticking_speed:
-            speed = math.sqrt(ux * ux + uy * uy + uz * uz)
-            record_collision(state, MERGE, -closing, reduced_mass(state, rules, i, j) * speed)
-            return merge(state, rules, i, j, now)
+        speed = math.sqrt(ux * ux + uy * uy + uz * uz)
+        measure = speed if rules.total_measure else -closing
+        if measure < sticking_threshold(state, rules, i, j):
+            return merge_touching(state, rules, i, j, now, (-closing, speed))
     restitution = 1.0
     if elastic:
         state.counts[ELASTIC_PAIR] += 1
@@ -186,6 +195,8 @@ def collide_pair(state: State, rules: Rules, i: int, j: int, now: float) -> int:
         restitution = with_least_separation(
             state, rules, i, j, (along_i, along_i + closing), restitution
         )
+    if is_turning(state) and (turns(state, i) or turns(state, j)):
+        return collide_rigid_bodies(state, rules, i, j, now, closing, restitution)
     state.counts[PAIR] += 1
     change = (1.0 + restitution) * closing
     per_length = (1.0 + restitution) * approach / square

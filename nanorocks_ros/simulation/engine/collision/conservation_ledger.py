@@ -7,44 +7,31 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.aggregates import advance, can_rotate, mass_of
+from nanorocks_ros.simulation.engine.collision.rigid_bodies import (
+    moment_of_body,
+    rotation_energy,
+    velocity_of_body,
+)
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,
     FOLLOWING,
+    INERTIA,
     MOMENTUM,
     OWN,
     RADIUS,
     SPIN,
-    VX,
     State,
     X,
     Y,
     Z,
 )
 from nanorocks_ros.simulation.engine.integer_width import as_int64
+from nanorocks_ros.simulation.engine.vectors import cross, sum_of
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
-
-Vector = tuple[float, float, float]
-
-# Moment of inertia of a solid sphere: 2/5 m r^2.
-INERTIA = 0.4
-
-
-@inlined
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-
-
-@inlined
-def length(a: Vector) -> float:
-    """Length of a vector."""
-    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    from nanorocks_ros.simulation.engine.vectors import Vector
 
 
 @inlined
@@ -92,7 +79,7 @@ def book_lost_torque(
     if math.isinf(mass_of(state, rules, i)):
         add_vector(state, MOMENTUM, impulse)
         add_vector(state, SPIN, cross(contact, impulse))
-    elif not can_rotate(state, rules, i):
+    elif not (is_turning(state) or can_rotate(state, rules, i)):
         centre = centre_of_mass(state, i, now)
         lever = contact[0] - centre[0], contact[1] - centre[1], contact[2] - centre[2]
         add_vector(state, AGGREGATE_SPIN, cross(lever, impulse))
@@ -102,8 +89,10 @@ def book_lost_torque(
 def angular_momentum(state: State, rules: Rules, i: int, now: float) -> Vector:
     """Angular momentum about the origin of a body that is free to move, [kg m^2/s]."""
     mass = mass_of(state, rules, i)
-    v = state.rows[i, VX], state.rows[i, VX + 1], state.rows[i, VX + 2]
+    v = velocity_of_body(state, i)
     x, y, z = cross(centre_of_mass(state, i, now), (mass * v[0], mass * v[1], mass * v[2]))
+    if is_turning(state):
+        x, y, z = sum_of((x, y, z), moment_of_body(state, i))
     if rules.rough and state.bodies[i, FOLLOWING] == i:
         radius = state.rows[i, RADIUS]
         inertia = INERTIA * state.masses[i, OWN] * radius * radius
@@ -120,8 +109,9 @@ def energy_of(state: State, rules: Rules, i: int) -> float:
     if math.isinf(mass):
         return 0.0
     rows = state.rows
-    square = rows[i, VX] ** 2 + rows[i, VX + 1] ** 2 + rows[i, VX + 2] ** 2
-    energy = 0.5 * mass * square
+    v = velocity_of_body(state, i)
+    square = v[0] ** 2 + v[1] ** 2 + v[2] ** 2
+    energy = 0.5 * mass * square + rotation_energy(state, i)
     if rules.rough and state.bodies[i, FOLLOWING] == i:
         radius = rows[i, RADIUS]
         spin = state.spins[i, 0] ** 2 + state.spins[i, 1] ** 2 + state.spins[i, 2] ** 2

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.aggregates import can_rotate, mass_of
-from nanorocks_ros.simulation.engine.collision.conservation_ledger import INERTIA, Vector, cross
-from nanorocks_ros.simulation.engine.gas_state import OWN, RADIUS, VX, State
+from nanorocks_ros.simulation.engine.gas_state import INERTIA, OWN, RADIUS, VX, State
+from nanorocks_ros.simulation.engine.vectors import cross
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.vectors import Vector
 
 
 @inlined

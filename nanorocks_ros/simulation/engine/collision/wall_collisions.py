@@ -13,6 +13,7 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.aggregates import (
     advance,
+    advance_body,
     fix_body,
     mass_of,
     propagate_velocity,
@@ -22,16 +23,18 @@ from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
     add_vector,
     angular_momentum,
     book_lost_torque,
-    cross,
     energy_of,
-    length,
 )
+from nanorocks_ros.simulation.engine.collision.contact_laws import wall_restitution
 from nanorocks_ros.simulation.engine.collision.friction import apply_wall_friction
 from nanorocks_ros.simulation.engine.collision.moving_walls import (
     largest_acceleration,
     time_to_moving_wall,
     tray_displacement,
 )
+from nanorocks_ros.simulation.engine.collision.rigid_bodies import velocity_of_body
+from nanorocks_ros.simulation.engine.collision.rigid_collisions import push_off_wall
+from nanorocks_ros.simulation.engine.collision.turning_walls import next_wall_of_turning
 from nanorocks_ros.simulation.engine.flight.gas_drag import (
     drag_rate,
     flight_time,
@@ -40,8 +43,9 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     velocity_at,
 )
 from nanorocks_ros.simulation.engine.flight.pair_times import speed_square
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turns
+from nanorocks_ros.simulation.engine.flight.turning_contacts import ROUNDING
 from nanorocks_ros.simulation.engine.gas_state import (
-    ELASTIC_WALL,
     EPOCH,
     FIX,
     IMPULSE,
@@ -50,8 +54,6 @@ from nanorocks_ros.simulation.engine.gas_state import (
     RADIUS,
     SPIN,
     VX,
-    VY,
-    VZ,
     WALL,
     WALL_IMPULSE,
     WALL_LOSS,
@@ -63,12 +65,12 @@ from nanorocks_ros.simulation.engine.gas_state import (
 )
 from nanorocks_ros.simulation.engine.integer_width import as_int64
 from nanorocks_ros.simulation.engine.recent_contacts import is_repeated
-from nanorocks_ros.simulation.engine.rules.restitution_laws import CONSTANT, restitution_at
+from nanorocks_ros.simulation.engine.vectors import cross, length
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
-# A bead farther from a moving wall than this fraction of its radius does not touch it.
+# A bead farther from a wall than this fraction of its radius does not touch it.
 _APART = 1e-6
 
 
@@ -102,6 +104,8 @@ def next_wall_event(
     near : int
         Bits of the walls to check, two for each axis.
     """
+    if is_turning(state) and turns(state, i):
+        return next_wall_of_turning(state, rules, i, now, near)
     rows = state.rows
     rate = drag_rate(state, i) if is_dragged(state) else 0.0
     place = position_at(state, i, now)
@@ -147,13 +151,13 @@ def stick_to_wall(state: State, rules: Rules, i: int, wall: int, now: float) -> 
     rows = state.rows
     mass = mass_of(state, rules, i)
     outward = 1.0 if wall % 2 else -1.0
-    state.ledger[WALL_IMPULSE + wall] += outward * mass * rows[i, VX + wall // 2]
+    velocity = velocity_of_body(state, i)
+    state.ledger[WALL_IMPULSE + wall] += outward * mass * velocity[wall // 2]
     state.ledger[WALL_LOSS] += energy_of(state, rules, i)
-    add_vector(state, MOMENTUM, (mass * rows[i, VX], mass * rows[i, VY], mass * rows[i, VZ]))
+    add_vector(state, MOMENTUM, (mass * velocity[0], mass * velocity[1], mass * velocity[2]))
     add_vector(state, SPIN, angular_momentum(state, rules, i, now))
     state.counts[FIX] += 1
-    speed = math.sqrt(speed_square(rows, i))
-    record_collision(state, FIX, abs(rows[i, VX + wall // 2]), mass * speed)
+    record_collision(state, FIX, abs(rows[i, VX + wall // 2]), mass * length(velocity))
     fix_body(state, rules, i)
     for axis in range(3):
         rows[i, VX + axis] = 0.0
@@ -179,6 +183,12 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     surface = moved + (rules.sides[axis] - radius if wall % 2 else radius)
     if rules.moving and abs(rows[i, X + axis] - surface) > _APART * radius:
         return 0
+    if is_turning(state) and turns(state, i):
+        # A search that takes many steps ends before the contact.
+        distant = abs(rows[i, X + axis] - surface) > _APART * radius
+        if distant or is_leaving(state, i, wall, wall_speed):
+            return 0
+        advance_body(state, i, now)
     shift_body(state, rules, i, axis, surface - rows[i, X + axis])
     rows[i, X + axis] = surface
     number = as_int64(state.links[i, ORIGINAL])
@@ -188,19 +198,15 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
         return stick_to_wall(state, rules, i, wall, now)
     state.counts[WALL] += 1
     before = rows[i, VX + axis] - wall_speed
-    restitution = rules.wall_restitution[wall]
-    if elastic:
-        state.counts[ELASTIC_WALL] += 1
-        restitution = 1.0
-    elif rules.wall_kind != CONSTANT:
-        restitution = restitution_at(
-            rules.wall_kind, restitution, rules.wall_per_speed, rules.wall_exponent, abs(before)
-        )
-    after = -restitution * before
+    after = -wall_restitution(state, rules, wall, abs(before), elastic) * before
     if rules.moving:
         after = with_least_rebound(state, rules, i, wall, now, after)
-    rows[i, VX + axis] = wall_speed + after
-    mass = mass_of(state, rules, i)
+    marked = 0
+    if is_turning(state) and turns(state, i):
+        marked, mass, after = push_off_wall(state, rules, i, axis, now, (before, after))
+    else:
+        rows[i, VX + axis] = wall_speed + after
+        mass = mass_of(state, rules, i)
     normal_impulse = mass * (before - after)
     state.ledger[WALL_LOSS] += (
         0.5 * mass * (before * before - after * after) + normal_impulse * wall_speed
@@ -210,7 +216,17 @@ def bounce_off_wall(state: State, rules: Rules, i: int, wall: int, now: float) -
     record_collision(state, WALL, abs(before), abs(normal_impulse))
     if rules.rough or rules.sticky:
         book_wall_collision(state, rules, i, wall, now, normal_impulse, elastic)
+    if marked:
+        return marked
     return propagate_velocity(state, rules, i, now, 0)
+
+
+@inlined
+def is_leaving(state: State, i: int, wall: int, wall_speed: float) -> bool:
+    """Whether a bead of a body that turns does not approach a wall, but for rounding."""
+    outward = 1.0 if wall % 2 else -1.0
+    approach = outward * (state.rows[i, VX + wall // 2] - wall_speed)
+    return bool(approach <= ROUNDING * math.sqrt(speed_square(state.rows, i)))
 
 
 @inlined

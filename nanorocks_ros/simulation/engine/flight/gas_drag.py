@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.numerics.exponentials import decay_time, decayed
 from nanorocks_ros.physics.stokes_drag import TURNING_PER_MOVING
+from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import TIME, VX, VY, VZ, X, Y, Z
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ def spin_left(state: State, i: int, since: float) -> float:
 @inlined
 def position_at(state: State, i: int, now: float) -> tuple[float, float, float]:
     """Position of a bead at a time, [m]."""
+    if is_turning(state) and turns(state, i):
+        return turned_bead(state, i, now)[0]
     rows = state.rows
     since = flown_time(state, i, now - rows[i, TIME])
     return (
@@ -102,6 +105,8 @@ def position_at(state: State, i: int, now: float) -> tuple[float, float, float]:
 @inlined
 def velocity_at(state: State, i: int, now: float) -> tuple[float, float, float]:
     """Velocity of a bead at a time, [m/s]."""
+    if is_turning(state) and turns(state, i):
+        return turned_bead(state, i, now)[1]
     rows = state.rows
     if is_dragged(state):
         left = speed_left(state, i, now - rows[i, TIME])

@@ -12,6 +12,7 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS, VX, VY, VZ
+from nanorocks_ros.simulation.engine.vectors import Vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
-Vector = tuple[float, float, float]
 Flights = tuple[Vector, Vector, Vector, Vector]
 
 # Squares of the approach, relative to the speeds, that is rounding; and of the gap, relative to

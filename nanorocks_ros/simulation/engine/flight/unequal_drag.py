@@ -20,11 +20,13 @@ from nanorocks_ros.numerics.exponentials import decayed
 from nanorocks_ros.simulation.engine.flight.gas_drag import drag_rate
 from nanorocks_ros.simulation.engine.flight.pair_times import is_rounding, minimum_image
 from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS
+from nanorocks_ros.simulation.engine.vectors import difference, product, scaled
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.flight.pair_times import Flights, Vector
+    from nanorocks_ros.simulation.engine.flight.pair_times import Flights
     from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
+    from nanorocks_ros.simulation.engine.vectors import Vector
 
 # A gap of this fraction of the reach is a contact.
 _CLOSED = 1e-13
@@ -33,24 +35,6 @@ _APART = 1e-9
 _MOST_STEPS = 200
 # Smallest step of time relative to the time: some units in the last place.
 _LEAST_STEP = 2e-15
-
-
-@inlined
-def scaled(a: Vector, factor: float) -> Vector:
-    """A vector times a number."""
-    return a[0] * factor, a[1] * factor, a[2] * factor
-
-
-@inlined
-def difference(a: Vector, b: Vector) -> Vector:
-    """Difference of two vectors."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@inlined
-def product(a: Vector, b: Vector) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined

@@ -30,6 +30,7 @@ from nanorocks_ros.simulation.engine.rules.rule_checks import (
     checked_tangential,
     three_floats,
 )
+from nanorocks_ros.simulation.engine.rules.sticking_rules import StickingRules
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion, check_motion
 
 if TYPE_CHECKING:
@@ -40,11 +41,8 @@ if TYPE_CHECKING:
 # Hertz contact of two 2 mm acrylic beads that meet at 10 mm/s lasts about this long.
 CONTACT_DURATION = 4e-5
 
-_NOT_STICKING = 0.0
 _WALLS = 6
 _OfWalls = tuple[float, float, float, float, float, float]
-
-STICKING_MEASURES = 'normal', 'total'
 
 
 class Rules(NamedTuple):
@@ -66,8 +64,12 @@ class Rules(NamedTuple):
     contact_duration: float
     sticky: bool
     sticking_speed: float
+    sticking_width: float
+    sticking_key: np.uint64
     wall_sticking_speed: float
     total_measure: bool
+    rotating: bool
+    break_up_speed: float
     rough: bool
     tangential: float
     wall_tangential: float
@@ -82,11 +84,13 @@ class Rules(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CollisionRules:
+class CollisionRules(StickingRules):
     """The box and the outcome of collisions.
 
     Parameters
     ----------
+    sticking_speed and others
+        See `StickingRules`.
     box : tuple of 3 floats, [m], > 0
         Sides; a corner is the origin.
     periodic : tuple of 3 bools
@@ -100,12 +104,6 @@ class CollisionRules:
         A contact is elastic when the last one of the same two beads (or of the same bead and
         wall) was less than this ago; without it, inelastic collapse leads to events without
         end.
-    sticking_speed : float, [m/s], >= 0
-        Bodies that meet more slowly merge into a rigid body that does not rotate.
-    wall_sticking_speed : float, [m/s], >= 0
-        Bodies that meet a wall more slowly stay there.
-    sticking_measure : 'normal' or 'total'
-        Speed to compare: normal component, or magnitude of the relative velocity.
     tangential_restitution, wall_tangential_restitution : float or None, -1 to 1
         Of rough spheres, which rotate: of the tangential velocity of the surfaces at the
         contact; -1 is smooth, 1 perfectly rough. None: beads have no spin; for the walls:
@@ -136,9 +134,6 @@ class CollisionRules:
     restitution: Restitution | Sequence[Sequence[float]] | NDArray[np.float64] = 1.0
     wall_restitution: float | SpeedLaw | Sequence[float] | Sequence[SpeedLaw] = 1.0
     contact_duration: float = CONTACT_DURATION
-    sticking_speed: float = _NOT_STICKING
-    wall_sticking_speed: float = _NOT_STICKING
-    sticking_measure: str = 'normal'
     tangential_restitution: float | None = None
     wall_tangential_restitution: float | None = None
     friction: float = math.inf
@@ -167,7 +162,12 @@ class CollisionRules:
         SimulationError
             For an invalid value.
         """
-        self._check_sticking()
+        rough = (
+            self.tangential_restitution is not None or self.wall_tangential_restitution is not None
+        )
+        self.check_sticking(
+            moving=self.motion is not None, rough=rough, periodic=any(self.periodic)
+        )
         kind, table, first, second, exponent = self._law()
         wall_kind, walls, wall_per_speed, wall_exponent = self._walls()
         sides = checked_box(self.box)
@@ -191,10 +191,13 @@ class CollisionRules:
             contact_duration=checked_non_negative('contact_duration', self.contact_duration, 's'),
             sticky=self.sticking_speed > 0.0 or self.wall_sticking_speed > 0.0,
             sticking_speed=float(self.sticking_speed),
+            sticking_width=float(self.sticking_speed_width),
+            sticking_key=key_for(self.seed, self.run, Purpose.STICKING),
             wall_sticking_speed=float(self.wall_sticking_speed),
             total_measure=self.sticking_measure == 'total',
-            rough=self.tangential_restitution is not None
-            or self.wall_tangential_restitution is not None,
+            rotating=self.forms_turning_bodies,
+            break_up_speed=float(self.break_up_speed),
+            rough=rough,
             tangential=checked_tangential('tangential_restitution', self.tangential_restitution),
             wall_tangential=checked_tangential(
                 'wall_tangential_restitution', self.wall_tangential_restitution
@@ -208,22 +211,6 @@ class CollisionRules:
             start=float(motion.start),
             end=float(motion.end),
         )
-
-    def _check_sticking(self) -> None:
-        checked_non_negative('sticking_speed', self.sticking_speed, 'm/s')
-        checked_non_negative('wall_sticking_speed', self.wall_sticking_speed, 'm/s')
-        if self.sticking_measure not in STICKING_MEASURES:
-            raise SimulationError(
-                'sticking_measure',
-                f'{self.sticking_measure!r} is none of {", ".join(STICKING_MEASURES)}',
-                'give one of them',
-            )
-        if self.wall_sticking_speed > 0.0 and self.motion is not None:
-            raise SimulationError(
-                'wall_sticking_speed',
-                'bodies cannot stick to walls that move',
-                'let the tray be at rest, or set it to 0',
-            )
 
     def _law(self) -> tuple[int, NDArray[np.float64], float, float, float]:
         law = self.restitution

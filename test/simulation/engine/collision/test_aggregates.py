@@ -36,6 +36,7 @@ def test_slow_pairs_merge_by_the_chosen_speed_measure(kernel, kind, rules):
         masses=[1, 3],
         spins=[(1, 0, 0), (0, 2, 0)],
         tangential_restitution=0.0,
+        aggregate_motion='translating',
         kernel=kernel,
         **rules,
     )
@@ -182,13 +183,14 @@ def test_a_body_stops_as_a_whole_at_a_wall_that_one_of_its_beads_reaches(kernel)
 
 
 @pytest.mark.parametrize('walls', [False, True])
-def test_bodies_keep_their_shape_their_velocity_and_their_members(kernel, walls):
+def test_bodies_that_do_not_turn_keep_their_shape_velocity_and_members(kernel, walls):
     rules = CollisionRules(
         box=(12, 11, 10),
         periodic=(not walls,) * 3,
         restitution=0.8,
         sticking_speed=0.4,
         wall_sticking_speed=0.2 if walls else 0.0,
+        aggregate_motion='translating',
     )
     gas = HardSphereGas(mixture(4, 40, rules), rules, kernel)
     record = gas.follow(60.0, np.linspace(0.0, 60.0, 61))

@@ -158,6 +158,7 @@ def test_speeds_that_decide_about_sticking_are_those_at_the_contact():
             [(0.5, 0, 0), (-0.5, 0, 0)],
             drag=np.full(2, RATE),
             sticking_speed=limit,
+            aggregate_motion='translating',
         )
         gas.run_until(2.0)
         assert (gas.counts.merge, gas.counts.pair) == (merged, 1 - merged)
@@ -171,6 +172,7 @@ def test_the_drag_on_a_body_is_the_sum_over_its_beads():
         masses=[1.0, 3.0],
         drag=np.array([0.4, 0.2]),
         sticking_speed=5.0,
+        aggregate_motion='translating',
         box=(1000.0, 10.0, 10.0),
     )
     gas.run_until(1.0)

@@ -89,7 +89,11 @@ def test_lists_that_overflow_on_the_way_grow(periodic, sticking_speed):
     inwards = 0.3 * (centre - grid.positions) + 0.01 * grid.velocities
     beads = beads_of(grid.positions, inwards, radii=0.5)
     rules = CollisionRules(
-        box=(48, 48, 48), periodic=periodic, restitution=0.5, sticking_speed=sticking_speed
+        box=(48, 48, 48),
+        periodic=periodic,
+        restitution=0.5,
+        sticking_speed=sticking_speed,
+        aggregate_motion='translating',
     )
     room = most_in_a_list(HardSphereGas(beads, rules, Kernel.LISTS))
     gas = lists_that_agree(beads, rules, events_per_bead=2)
