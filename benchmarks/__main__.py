@@ -44,6 +44,7 @@ ALL = (
     'sticking',
     'sticking_films',
     'turning_bodies',
+    'stuck_restitution',
     'packing',
     'rotation',
     'decay_libraries',
