@@ -96,6 +96,7 @@ def _records(number: int, gas: Gas, seed: int, seconds: float) -> Iterator[Array
             if isinstance(body, Merge):
                 rebounds.push(body)
             yield body
+        rebounds.noise = finder.noise
         yield from rebounds.push(picture.tracks)
         if frame % _EVERY == 0:
             yield _speed(picture.tracks, noise.standard_normal())

@@ -200,6 +200,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         for merge in bodies:
             if isinstance(merge, Merge):
                 self._body_rebounds.push(merge)
+        self._body_rebounds.noise = self._contacts.noise
         return [*bodies, *self._body_rebounds.push(tracks)]
 
     def _in_cycle(self, contacts: Iterable[ContactOrFlight]) -> list[Event]:

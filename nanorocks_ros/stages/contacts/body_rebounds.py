@@ -71,12 +71,19 @@ class BodyRebounds(RestartingStage[Tracks | Merge, Rebound]):
     Parameters
     ----------
     tray : Tray
+
+    Attributes
+    ----------
+    noise : ndarray (species,)
+        Variance of positions about free flights over that by their errors, as `ContactFinder`
+        learns it.
     """
 
     clock = Tracks
 
     def __init__(self, tray: Tray) -> None:
         self._tray = tray
+        self.noise = np.ones(len(tray.species))
         self._densities = np.array([kind.density for kind in tray.species])
         diameter = float(np.mean([kind.diameter for kind in tray.species]))
         self._spread = max(0.5 * (tray.dimensions[2] - diameter), _LEAST_SPREAD)
@@ -255,6 +262,7 @@ class BodyRebounds(RestartingStage[Tracks | Merge, Rebound]):
             axis=axis,
             outward=1.0 if high else -1.0,
             spread=self._spread,
+            noise=float(self.noise[frame.species[row]].mean()),
         )
 
     def _is_clear(self, fit: RigidRebound) -> bool:

@@ -32,6 +32,9 @@ _MAX_WAITING = 5000
 # Change of the drag from which on the speeds of all contacts are corrected again, [1/s]; a smaller
 # one shifts their likelihood.
 _DRAG_STEP = 0.003
+# Rebounds of free beads from which on those of bodies do not count: they are ten times as precise,
+# and floor and lid, which turn bodies unseen, do not disturb them.
+_ENOUGH_FREE = 10
 
 
 class CycleContacts:
@@ -64,6 +67,7 @@ class CycleContacts:
         self._sticking: NDArray[np.float64] | None = None
         self._sticking_speed = 0.0
         self._bounces: BounceTables | None = None
+        self._bodies_count = True
         self.next_cycle()
 
     def push(self, contact: ContactOrFlight) -> None:
@@ -125,6 +129,7 @@ class CycleContacts:
         self._merges, self._bound_since = [], {}
         self._drag = 0.0
         self._sticking, self._sticking_speed = None, 0.0
+        self._bodies_count = True
         self._start_sums()
 
     @property
@@ -132,19 +137,28 @@ class CycleContacts:
         """Table of the flights, see `flight_table`."""
         return flight_table(self._flights)
 
+    def _free_rebounds(self) -> int:
+        contacts = (*self._counted, *self._new)
+        return sum(isinstance(each, Rebound) and not _is_of_body(each) for each in contacts)
+
     @property
     def body_rebounds(self) -> int:
-        """Rebounds of bodies of several beads among the contacts."""
+        """Rebounds of bodies of several beads that count: none where free beads are enough."""
         contacts = (*self._counted, *self._new)
-        return sum(isinstance(contact, Rebound) and contact.beads > 1 for contact in contacts)
+        return sum(map(_is_of_body, contacts)) if self._bodies_count else 0
 
     def terms(self, drag: float) -> ContactTerms:
         """Likelihoods of the contacts, with speeds for about this drag of the gas, [1/s]."""
-        if abs(drag - self._drag) > _DRAG_STEP:
-            self._drag = drag
+        bodies_count = self._free_rebounds() < _ENOUGH_FREE
+        if abs(drag - self._drag) > _DRAG_STEP or bodies_count != self._bodies_count:
+            self._drag, self._bodies_count = drag, bodies_count
             self._start_sums()
         if self._new:
-            dragged_contacts = [dragged(contact, self._drag) for contact in self._new]
+            dragged_contacts = [
+                dragged(contact, self._drag)
+                for contact in self._new
+                if bodies_count or not _is_of_body(contact)
+            ]
             self._terms += ContactTerms.of(dragged_contacts, self._sticking_speed)
             if self._sticking is not None:
                 collisions = [each for each in dragged_contacts if isinstance(each, PairCollision)]
@@ -165,3 +179,7 @@ class CycleContacts:
         kept = [contact for contact in self._waiting if keep(contact.stamp_ns)]
         self._waiting.clear()
         self._waiting.extend(kept)
+
+
+def _is_of_body(contact: Contact) -> bool:
+    return isinstance(contact, Rebound) and contact.beads > 1

@@ -55,6 +55,9 @@ class BodyFrames:
         1 for the high wall, -1 for the low one.
     spread : float, [m]
         Standard deviation of the heights of beads about their mean.
+    noise : float
+        Variance of positions about flights over that by the errors: where these are too large a
+        misfit shows in less.
     """
 
     times: NDArray[np.float64]
@@ -66,6 +69,7 @@ class BodyFrames:
     axis: int
     outward: float
     spread: float
+    noise: float = 1.0
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -149,7 +153,7 @@ def rigid_rebound(frames: BodyFrames, first: int) -> RigidRebound | None:
         outgoing=outgoing,
         errors=np.sqrt(shared * variances),
         tangential=float(motion.velocity[1 - frames.axis]),
-        excess=(fit.chi_square(solution.x) - freedom) / math.sqrt(2.0 * freedom),
+        excess=(fit.chi_square(solution.x) / frames.noise - freedom) / math.sqrt(2.0 * freedom),
     )
 
 
