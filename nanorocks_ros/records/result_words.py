@@ -116,7 +116,8 @@ FLAGS = {
     ),
     Quality.STICKING: Words(
         'beads began to stick in the cycle: the decay counts up to the first merge, contacts of '
-        'free beads and rebounds of bodies count to the end',
+        'free beads to the end, and rebounds of bodies where those of free beads are fewer than '
+        'ten',
         'nothing needs to be done; onset, body_rebounds and sticking_speed say more',
     ),
 }
