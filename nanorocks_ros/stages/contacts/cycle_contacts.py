@@ -32,8 +32,8 @@ _MAX_WAITING = 5000
 # Change of the drag from which on the speeds of all contacts are corrected again, [1/s]; a smaller
 # one shifts their likelihood.
 _DRAG_STEP = 0.003
-# Rebounds of free beads from which on those of bodies do not count: floor and lid, which turn bodies
-# unseen, do not disturb them.
+# Rebounds of free beads from which on those of bodies do not count: floor and lid, which turn
+# bodies unseen, do not disturb them.
 _ENOUGH_FREE = 10
 
 
