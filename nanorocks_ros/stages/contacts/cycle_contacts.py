@@ -150,8 +150,11 @@ class CycleContacts:
     def terms(self, drag: float) -> ContactTerms:
         """Likelihoods of the contacts, with speeds for about this drag of the gas, [1/s]."""
         bodies_count = self._free_rebounds() < _ENOUGH_FREE
-        if abs(drag - self._drag) > _DRAG_STEP or bodies_count != self._bodies_count:
-            self._drag, self._bodies_count = drag, bodies_count
+        if abs(drag - self._drag) > _DRAG_STEP:
+            self._drag = drag
+            self._start_sums()
+        if bodies_count != self._bodies_count:
+            self._bodies_count = bodies_count
             self._start_sums()
         if self._new:
             dragged_contacts = [
