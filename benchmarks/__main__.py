@@ -51,6 +51,7 @@ ALL = (
     'sticking_films',
     'turning_bodies',
     'rotating_aggregates',
+    'stuck_restitution',
     'packing',
     'rotation',
     'decay_libraries',

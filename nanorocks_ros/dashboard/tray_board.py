@@ -211,7 +211,9 @@ class TrayBoard:
             self.start_ns = record.cycle_start_ns
         if self.start_ns is not None or not isinstance(record, CorEstimate):
             return
-        if math.isfinite(record.window_end):
+        # Where beads stick the window ends with the decay, before the last contact counts.
+        sticks = Quality.STICKING in record.quality
+        if math.isfinite(record.window_end) and not sticks:
             # A late subscriber gets the latched estimates before the first speed.
             self.start_ns = record.stamp_ns - round(record.window_end * NS)
 

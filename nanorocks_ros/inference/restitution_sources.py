@@ -184,7 +184,7 @@ def restitution_sources(
     if headline is Headline.CONTACTS:
         slowing = losses.rubbed if losses else NO_SLOWING
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-        wall_likelihood = _with_friction(contacts, prior, slowing.drag)
+        wall_likelihood = _with_friction(contacts, prior, slowing)
     return RestitutionSources(
         joint=joint,
         decay=posterior_of(tables, log_likelihood, walls) if number else joint,
@@ -198,16 +198,16 @@ def restitution_sources(
 
 
 def _with_friction(
-    contacts: ContactTerms, prior: PriorSettings, drag: Measured
+    contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
 ) -> Likelihood1D | None:
     """Log likelihood of the wall restitution where floor and lid rub as the walls do."""
     wide = replace(prior, friction_error=_WIDER * prior.friction_error)
     weights = friction_weights(wide, contacts)
     if weights is None:
-        # Only where there are no rebounds.
-        return None
+        # Only where no bead rebounds by itself.
+        return contacts.wall_likelihood(prior.rebound_bias, slowing)
     return contacts.rubbed_wall_likelihood(
-        prior.rebound_bias, drag, (weights.friction, weights.weight)
+        prior.rebound_bias, slowing.drag, (weights.friction, weights.weight)
     )
 
 

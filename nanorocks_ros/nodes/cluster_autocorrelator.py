@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.nodes.trays.tray_stage_node import TrayStageNode
 from nanorocks_ros.pipeline.changed_settings import Part
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters
-from nanorocks_ros.records import BodyEstimate, Merge, SpeedEstimate
+from nanorocks_ros.records import BodyEstimate, Merge, PairCollision, SpeedEstimate
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
@@ -26,6 +26,7 @@ _FROM_TRACKS = (
     (topics.SPEED, SpeedEstimate),
     (topics.BODIES, BodyEstimate),
     (topics.MERGE, Merge),
+    (topics.COLLISION, PairCollision),
 )
 
 

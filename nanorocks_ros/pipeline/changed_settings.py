@@ -29,7 +29,7 @@ class Part(Flag):
 _READ_BY = {
     'bodies': Part.MEASUREMENT,
     'clusters': Part.CLUSTERS,
-    'sticking': Part.CLUSTERS,
+    'sticking': Part.CLUSTERS | Part.RESTITUTION,
     'cooling': Part.RESTITUTION,
     'prior': Part.RESTITUTION,
 }

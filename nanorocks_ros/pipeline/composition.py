@@ -24,6 +24,7 @@ from nanorocks_ros.records import (
     Merge,
     MotionMask,
     Notice,
+    PairCollision,
     SpeedEstimate,
     Tracks,
     TrayImage,
@@ -128,7 +129,7 @@ class TrayStages:
             records.append(record)
             if isinstance(record, RestitutionInput):
                 records += self.restitution.push(record)
-            if isinstance(record, SpeedEstimate | BodyEstimate | Merge):
+            if isinstance(record, SpeedEstimate | BodyEstimate | Merge | PairCollision):
                 self.clusters.push(record)
         return records
 

@@ -20,6 +20,7 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
+from nanorocks_ros.stages.contacts.body_rebounds import BodyRebounds
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
@@ -107,6 +108,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         self.recognition = RecognitionCounter(tray, crowded=self._tracker.crowded)
         self._contacts = ContactFinder(tray, drag)
         self._bodies = BodyCounter(settings, tray)
+        self._body_rebounds = BodyRebounds(tray)
         self._scale = ScaleCheck(settings, tray)
         self._track_speed = TrackSpeed(settings, tray, crowded=self._tracker.crowded)
         self._structure_speed = StructureSpeed(settings, tray, crowded=self._tracker.crowded)
@@ -140,7 +142,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
                 contacts = self._contacts_in(tracks)
                 notices += self._scale_notices(tracks, contacts)
                 events += contacts
-                events += self._bodies.push(tracks)
+                events += self._bodies_in(tracks)
                 speeds += self._track_speed.push(tracks)
         else:
             self._tracker.watch(image)
@@ -156,7 +158,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         speeds = self._structure_speed.flush() if self._selector.uses_structure else ()
         contacts = self._in_cycle(sorted(self._contacts.flush(), key=attrgetter('stamp_ns')))
         notices = [*self._scale_notices(None, contacts), *self._scale.flush()]
-        events = [*contacts, *self._bodies.flush()]
+        events = [*contacts, *self._bodies.flush(), *self._body_rebounds.flush()]
         return (*last, *notices, *self._selected(speeds), *self._reliable(events))
 
     @property
@@ -205,6 +207,17 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         if not (cooling.rebounds or cooling.collisions):
             return []
         return self._in_cycle(self._contacts.push(tracks))
+
+    def _bodies_in(self, tracks: Tracks) -> list[Event]:
+        """Merges and counts of bodies in the tracks of a frame, and rebounds of bodies."""
+        bodies = self._bodies.push(tracks)
+        if not self._settings.cooling.rebounds:
+            return list(bodies)
+        for merge in bodies:
+            if isinstance(merge, Merge):
+                self._body_rebounds.push(merge)
+        self._body_rebounds.noise = self._contacts.noise
+        return [*bodies, *self._body_rebounds.push(tracks)]
 
     def _in_cycle(self, contacts: Iterable[ContactOrFlight]) -> list[Event]:
         """The contacts with their cycle: some before a shaking event are known only after it."""

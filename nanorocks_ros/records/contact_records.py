@@ -53,6 +53,8 @@ class Rebound:
         Of the species at that time: mean square of a horizontal component.
     free_height : float, [m]
         Height of the tray less the diameter of the bead: its way from floor to lid.
+    beads : int
+        Of the body that rebounds: 1 for a free bead. Of a body `track` is the bead that touches.
     """
 
     stamp_ns: int
@@ -74,6 +76,7 @@ class Rebound:
     friction_length: float = 0.0
     temperature: float = 0.0
     free_height: float = 0.0
+    beads: int = 1
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

@@ -22,6 +22,7 @@ FRICTION_SIGMAS = 1.645
 # Flags with which the decay does not count.
 _FLAGGED = {
     Quality.ACCELERATED: 'an acceleration drives the beads',
+    Quality.STICKING: 'beads stick, which the decay from then on does not allow for',
     Quality.SPEED_DEPENDENT: 'contacts at different speeds contradict a constant restitution',
 }
 

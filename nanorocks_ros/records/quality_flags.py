@@ -84,6 +84,7 @@ class Quality(IntFlag):
     DOUBTFUL_SCALE = 4096
     ACCELERATED = 8192
     SPEED_DEPENDENT = 16384
+    STICKING = 32768
 
     def names(self) -> list[str]:
         """Names of the flags that are set, in lower case."""

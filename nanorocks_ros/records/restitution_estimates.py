@@ -32,7 +32,7 @@ class CorEstimate:
     Parameters
     ----------
     stamp_ns : int
-        Last speed used.
+        Last speed up to which decay or contacts count.
     tray, cycle : int
     status : CorStatus
     relation : CorRelation
@@ -47,7 +47,7 @@ class CorEstimate:
         Of the fit. For ``CorRelation.LIBRARY`` with the fluctuations of the gas and the errors of
         the speeds, near 1; for ``PAPER`` with the errors of the speeds alone.
     samples : int
-        Speeds in the cooling window.
+        Speeds of the decay.
     mean_restitution : Measured
         Of all cycles finished so far, and its standard error.
     wall_restitution : Interval, 0 to 1
@@ -60,7 +60,8 @@ class CorEstimate:
     quality : Quality
         What was wrong with the pictures behind the speeds.
     window_start, window_end : float, [s]
-        First and last speed used, since the shaking event.
+        First and last speed of the decay, since the shaking event; NaN where beads stuck too soon
+        for a decay.
     cooling_start : float, [s]
         From when on the gas is taken to cool, since the shaking event: 0, or later when the tray
         swung on.
@@ -102,6 +103,11 @@ class CorEstimate:
         Restitution at these speeds, by that power law. Where `SPEED_DEPENDENT` is set,
         `restitution` is that which loses as much energy in the contacts that were seen; the
         constant one is `contact_restitution`.
+    onset : float, [s]
+        From when on beads stick, since the shaking event: the decay counts until then; NaN where
+        none do.
+    body_rebounds : int
+        Of `rebounds`, those of bodies of several beads.
     """
 
     stamp_ns: int
@@ -144,3 +150,5 @@ class CorEstimate:
     wall_impact_speed: float = UNKNOWN
     impact_restitution: Interval = UNKNOWN_INTERVAL
     wall_impact_restitution: Interval = UNKNOWN_INTERVAL
+    onset: float = UNKNOWN
+    body_rebounds: int = 0

@@ -115,6 +115,12 @@ FLAGS = {
         'and wall_impact_speed, the exponents say how 1 - restitution goes with speed, '
         'contact_restitution is the constant one',
     ),
+    Quality.STICKING: Words(
+        'beads began to stick in the cycle: the decay counts up to the first merge, contacts of '
+        'free beads to the end, and rebounds of bodies where those of free beads are fewer than '
+        'ten',
+        'nothing needs to be done; onset, body_rebounds and sticking_speed say more',
+    ),
 }
 """Meaning and remedy of each flag."""
 
@@ -207,11 +213,6 @@ def reason_of(cor: CorEstimate) -> Words | None:
             'look at them with `nanorocks speeds BAG -o speeds.png`; does the camera move, or '
             'was the tray shaken again?',
         )
-    if math.isnan(cor.window_start):
-        return Words(
-            f'too few speeds before the end of the cycle or the first merge: {cor.samples}',
-            'film longer; where beads stick early pass --cooling-until-merge false',
-        )
     contacts = f'{cor.rebounds} rebounds and {cor.collisions} collisions'
     if cor.headline is Headline.CONTACTS:
         why = reason_for_contacts(cor.tension, cor.wall_friction, cor.quality)
@@ -219,6 +220,11 @@ def reason_of(cor: CorEstimate) -> Words | None:
             f'only contacts count{", since " if why else ""}{why}, and {contacts} tell too little '
             'of the beads',
             'film more cycles, longer, and closer or at a higher rate',
+        )
+    if math.isnan(cor.window_start):
+        return Words(
+            f'too few speeds before the end of the cycle or the first merge: {cor.samples}',
+            'film longer; where beads stick early, film closer, so that contacts are found',
         )
     if math.isnan(cor.reduced_chi_square):
         return Words(

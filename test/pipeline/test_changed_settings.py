@@ -28,7 +28,7 @@ BEFORE = PipelineSettings()
         ('cooling.rebounds', False, Part.RESTITUTION | Part.MEASUREMENT),
         ('prior.drag', 0.5, Part.RESTITUTION | Part.MEASUREMENT),
         ('clusters.level', 0.6, Part.CLUSTERS),
-        ('sticking.measure', 'total', Part.CLUSTERS),
+        ('sticking.measure', 'total', Part.CLUSTERS | Part.RESTITUTION),
         ('bodies.delay', 2.0, Part.MEASUREMENT),
         ('speed.interval', 0.2, Part.IMAGES),
         ('tracking.window', 0.5, Part.IMAGES),

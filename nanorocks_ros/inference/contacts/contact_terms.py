@@ -46,7 +46,8 @@ NO_SLOWING = Slowing.by_drag(Measured(0.0, 0.0))
 
 # A single contact determines the bead restitution to 0.02 and the wall restitution to 0.003 at
 # best: a spline through these nodes represents sums of log likelihoods.
-_BEADS = np.linspace(0.0, 1.0, 101)
+BEADS = np.linspace(0.0, 1.0, 101)
+"""Restitutions of beads at which collisions are compared."""
 _WALLS = np.linspace(_LOWEST_REBOUND, 1.0, 501)
 
 
@@ -80,8 +81,17 @@ class ContactTerms:
     collision_impacts: NDArray[np.float32]
 
     @classmethod
-    def of(cls, contacts: Iterable[Rebound | PairCollision]) -> ContactTerms:
-        """Tables of some contacts; 0 everywhere without contacts."""
+    def of(
+        cls, contacts: Iterable[Rebound | PairCollision], sticking_speed: float = 0.0
+    ) -> ContactTerms:
+        """Tables of some contacts; 0 everywhere without contacts.
+
+        Parameters
+        ----------
+        contacts : iterable of Rebound or PairCollision
+        sticking_speed : float, [m/s]
+            Beads with a smaller impact speed merge, so that their collisions are missing.
+        """
         contacts = list(contacts)
         rebounds = [contact for contact in contacts if isinstance(contact, Rebound)]
         collisions = [contact for contact in contacts if isinstance(contact, PairCollision)]
@@ -89,12 +99,12 @@ class ContactTerms:
             rebounds=len(rebounds),
             collisions=len(collisions),
             walls=rebound_table(rebounds, _WALLS),
-            beads=pair_table(collisions, _BEADS),
+            beads=pair_table(collisions, BEADS, sticking_speed=sticking_speed),
             friction=friction_table(rebounds),
             rebound_losses=loss_sums(rebounds),
             collision_losses=loss_sums(collisions),
             rebound_impacts=rebound_impacts(rebounds),
-            collision_impacts=collision_impacts(collisions),
+            collision_impacts=collision_impacts(collisions, sticking_speed),
         )
 
     def __add__(self, other: ContactTerms) -> ContactTerms:
@@ -113,12 +123,12 @@ class ContactTerms:
     @property
     def wall_friction(self) -> Measured:
         """Coefficient of friction of the side walls, from rebounds; unknown without any."""
-        return wall_friction(self.friction) if self.rebounds else UNKNOWN_MEASURED
+        return wall_friction(self.friction) if self.friction.any() else UNKNOWN_MEASURED
 
     @property
     def friction_likelihood(self) -> Likelihood1D | None:
-        """Log likelihood of the friction that rebounds show; None without any."""
-        return friction_likelihood(self.friction) if self.rebounds else None
+        """Log likelihood of the friction that rebounds of free beads show; None without any."""
+        return friction_likelihood(self.friction) if self.friction.any() else None
 
     def wall_likelihood(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
@@ -164,7 +174,7 @@ class ContactTerms:
         """Log likelihood of the bead restitution from collisions, as `wall_likelihood`."""
         if not self.collisions:
             return None
-        term = Likelihood1D(restitution=_BEADS, log_likelihood=marginal(self.beads))
+        term = Likelihood1D(restitution=BEADS, log_likelihood=marginal(self.beads))
         return _slowed(term, loss_beside_contacts(self.collision_losses, slowing), bias)
 
     def wall_exponent(
@@ -218,7 +228,7 @@ class ContactTerms:
     def _bead_correction(self) -> tuple[float, float]:
         """What radii and vertical speeds change: a factor on the losses, and a spread."""
         known, unknown = (
-            Likelihood1D(restitution=_BEADS, log_likelihood=logs).posterior((0.0, 1.0))
+            Likelihood1D(restitution=BEADS, log_likelihood=logs).posterior((0.0, 1.0))
             for logs in (self.beads[MIDDLE_NUISANCE], marginal(self.beads))
         )
         spread = math.sqrt(max(unknown.deviation**2 - known.deviation**2, 0.0))

@@ -99,14 +99,24 @@ def _of_rebound(rebound: Rebound) -> tuple[float, ...]:
     )
 
 
-def collision_impacts(collisions: Sequence[PairCollision]) -> NDArray[np.float32]:
-    """A row for each collision that has an impact speed, (n, COLLISION_COLUMNS)."""
+def collision_impacts(
+    collisions: Sequence[PairCollision], sticking_speed: float = 0.0
+) -> NDArray[np.float32]:
+    """A row for each collision that has an impact speed, (n, COLLISION_COLUMNS).
+
+    Parameters
+    ----------
+    collisions : sequence of PairCollision
+    sticking_speed : float, [m/s]
+        Slower collisions are missing, since their beads merge.
+    """
     if not collisions:
         return np.zeros((0, COLLISION_COLUMNS), dtype=np.float32)
     seen = ProjectedCollisions.of(collisions).with_errors(PAIR_ERRORS)
     grid, ratios = np.linspace(0.0, 1.0, NODES), np.array([_RATIO])
+    limits = sticking_speed, OUTLIERS
     level, tilted = (
-        projected_log_densities(seen, grid, ratios, _RADIUS_ERROR, (0.0, OUTLIERS), slope)[0]
+        projected_log_densities(seen, grid, ratios, _RADIUS_ERROR, limits, slope)[0]
         for slope in (0.0, _SLOPE)
     )
     losses = [

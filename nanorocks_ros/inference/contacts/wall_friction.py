@@ -43,12 +43,14 @@ def friction_table(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
     Parameters
     ----------
     rebounds : sequence of Rebound
+        Those of bodies are left out: their beads change tangential speeds by turning, too.
 
     Returns
     -------
     ndarray (m, n)
         Log likelihood up to a constant; 0 without rebounds. Tables of more rebounds add up.
     """
+    rebounds = [rebound for rebound in rebounds if rebound.beads == 1]
     if not rebounds:
         return np.zeros((len(ERROR_SCALES), FRICTIONS.size))
     before, after, error, change = np.array(

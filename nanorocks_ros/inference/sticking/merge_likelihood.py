@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.sticking.bounce_tables import SPEEDS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,7 +40,8 @@ class MergeLikelihood:
     exposed : bool
         Whether there were bodies that could have merged.
     logs : ndarray (n,)
-        Sum of the logarithms of the rates of the merges.
+        Sum of the logarithms of the rates of the merges, and log likelihood of the collisions that
+        did not stick.
     expected : ndarray (n,)
         Expected number of merges.
     """
@@ -121,6 +123,8 @@ class MergeRates:
             return replace(self.nothing, merges=usable.merges.size)
         speeds = np.interp(usable.merges, usable.times, usable.speeds)
         logs = self._contacts.summed_log_rate_below(self.speeds, speeds, self._measure)
+        if usable.merges.size and usable.bounces.size:
+            logs = logs + np.interp(self.speeds, SPEEDS, usable.bounces)
         return MergeLikelihood(
             speeds=self.speeds,
             merges=usable.merges.size,

@@ -5,7 +5,7 @@ Tested by ``test/inference/sticking/test_sticking_speed.py``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,12 +34,16 @@ class StickingCycle:
         Free bodies.
     merges : ndarray (m,), [s]
         Times at which bodies merged.
+    bounces : ndarray (k,)
+        Log likelihood of each of `bounce_tables.SPEEDS` by the collisions of free beads that did
+        not stick; empty where they are not known.
     """
 
     times: NDArray[np.float64]
     speeds: NDArray[np.float64]
     bodies: NDArray[np.float64]
     merges: NDArray[np.float64]
+    bounces: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 def sticking_cycle(

@@ -106,12 +106,27 @@ def sticking_estimate_of(
     grid, merges = terms.speeds, terms.merges
     if not terms.exposed:
         return _nothing(StickingStatus.STUCK_FROM_THE_START, float(grid[-1]), merges, probability)
-    factors = rate_error * _NORMAL_NODES[:, np.newaxis]
-    likelihood = log_sum(
-        merges * factors + terms.logs - np.exp(factors) * terms.expected,
-        _NORMAL_WEIGHTS / _NORMAL_WEIGHTS.sum(),
-    )
+    likelihood = merge_log_likelihood(terms, rate_error)
     return _posterior(grid, likelihood, merges, probability)
+
+
+def merge_log_likelihood(terms: MergeLikelihood, rate_error: float) -> NDArray[np.float64]:
+    """Log likelihood of each sticking speed of the grid, (n,), by the merges.
+
+    Parameters
+    ----------
+    terms : MergeLikelihood
+        Of cycles with bodies that could have merged.
+    rate_error : float
+        As of `sticking_estimate_of`.
+    """
+    factors = rate_error * _NORMAL_NODES[:, np.newaxis]
+    return np.asarray(
+        log_sum(
+            terms.merges * factors + terms.logs - np.exp(factors) * terms.expected,
+            _NORMAL_WEIGHTS / _NORMAL_WEIGHTS.sum(),
+        )
+    )
 
 
 def _posterior(

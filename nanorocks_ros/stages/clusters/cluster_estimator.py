@@ -18,6 +18,7 @@ from nanorocks_ros.records import (
     MeasuredInterval,
     Merge,
     Notice,
+    PairCollision,
     Quality,
     SizeStatus,
     SpeedEstimate,
@@ -48,7 +49,7 @@ _SMALLEST_ERROR = 0.01
 # States in which the width has a reading on the curve.
 _WITH_READING = (SizeStatus.MEASURED, SizeStatus.BEYOND)
 
-Input = TrayImage | SpeedEstimate | BodyEstimate | Merge
+Input = TrayImage | SpeedEstimate | BodyEstimate | Merge | PairCollision
 Clusters = ClusterEstimate | Autocorrelation | Notice
 
 

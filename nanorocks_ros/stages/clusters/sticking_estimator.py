@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right, insort
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from operator import add, attrgetter
 from typing import TYPE_CHECKING, NoReturn
@@ -12,16 +12,27 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.inference.sticking.bounce_tables import RunningBounces
 from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate_of
 from nanorocks_ros.physics.sticking_rates import slow_contacts
-from nanorocks_ros.records import NS, BodyEstimate, Merge, Quality, SpeedEstimate
+from nanorocks_ros.records import (
+    NS,
+    BodyEstimate,
+    Merge,
+    PairCollision,
+    Quality,
+    SpeedEstimate,
+)
+from nanorocks_ros.stages.contacts.bound_beads import bound_since, is_free
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
@@ -33,7 +44,9 @@ _KEPT_NS = 20 * NS
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _ROUNDING_NS = 1_000_000
 
-Input = SpeedEstimate | BodyEstimate | Merge
+# Collisions are known two seconds after they happened, as estimates are.
+_COLLISION_NS = NS
+Input = SpeedEstimate | BodyEstimate | Merge | PairCollision
 _stamp = attrgetter('stamp_ns')
 
 
@@ -49,6 +62,8 @@ class _Cycle:
     speeds: list[float] = field(default_factory=list)
     merges: list[Merge] = field(default_factory=list)
     bodies: list[BodyEstimate] = field(default_factory=list)
+    collisions: list[PairCollision] = field(default_factory=list)
+    bounces: RunningBounces = field(default_factory=RunningBounces)
 
 
 class StickingEstimator(RestartingStage[Input, NoReturn]):
@@ -69,6 +84,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._settings = settings.sticking
         self._tray = tray
+        self._delay_ns = round(settings.cooling.delay * NS)
         self._make_rates: Callable[[], MergeRates] | None = None
         with suppress(NanorocksError):
             # Without a theory of the tray merges are counted, but there is no sticking speed.
@@ -91,6 +107,8 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         cycle = self._cycles.setdefault(record.cycle, _Cycle(record.cycle))
         if isinstance(record, Merge):
             cycle.merges.append(record)
+        elif isinstance(record, PairCollision):
+            insort(cycle.collisions, record, key=_stamp)
         elif isinstance(record, BodyEstimate):
             insort(cycle.bodies, record, key=_stamp)
             # Half of them at once, for what is left has to move up.
@@ -183,13 +201,27 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         used = int(np.searchsorted(own.stamps_ns, stamp_ns + _ROUNDING_NS))
         if used < _FEWEST_SPEEDS:
             return None
-        return sticking_cycle(
+        merges = self._known_merges(own, stamp_ns)
+        so_far = sticking_cycle(
             self._tray.count,
-            self._known_merges(own, stamp_ns),
+            merges,
             np.array(own.stamps_ns[:used], dtype=np.int64),
             np.array(own.speeds[:used]),
             own.start_ns,
         )
+        return replace(so_far, bounces=self._bounces(own, merges, stamp_ns)) if merges else so_far
+
+    def _bounces(self, own: _Cycle, merges: list[Merge], stamp_ns: int) -> NDArray[np.float64]:
+        """What collisions of free beads up to a second before an instant tell; empty without."""
+        first_ns = (own.start_ns or 0) + self._delay_ns
+        bound = bound_since(merges)
+        collisions = [
+            collision
+            for collision in own.collisions
+            if first_ns <= collision.stamp_ns <= stamp_ns - _COLLISION_NS
+            and is_free(collision, bound)
+        ]
+        return own.bounces.of(collisions).speed_log_likelihood() if collisions else np.empty(0)
 
     def _terms_of(
         self, cycle: StickingCycle, rates: MergeRates | None = None

@@ -106,6 +106,11 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
             self._segments.use_drag(self._drag.drag)
         return (*contacts, *flights)
 
+    @property
+    def noise(self) -> NDArray[np.float64]:
+        """Variance of positions about flights over that by their errors, (species,)."""
+        return self._segments.noise
+
     def _flights(self) -> list[FreeFlight]:
         return [
             free_flight(

@@ -149,6 +149,11 @@ class FlightSegments:
         flights, self._flights = self._flights, []
         return flights
 
+    @property
+    def noise(self) -> NDArray[np.float64]:
+        """Variance of positions about flights over that by their errors, (species,)."""
+        return self._residuals.variances
+
     def use_drag(self, drag: float) -> None:
         """Fit lines in the clock of a gas from now on.
 

@@ -35,7 +35,7 @@ class CycleRestitution:
     initial_speed : Measured, [m/s]
     haff_time : Measured, [s]
     reduced_chi_square, paper_restitution, tension : float
-    rebounds, collisions : int
+    rebounds, collisions, body_rebounds : int
     mean_restitution, mean_wall_restitution : Measured
     headline : Headline
     joint_restitution, joint_wall_restitution : Interval
@@ -63,6 +63,7 @@ class CycleRestitution:
     paper_restitution: float = UNKNOWN
     rebounds: int = 0
     collisions: int = 0
+    body_rebounds: int = 0
     tension: float = UNKNOWN
     mean_restitution: Measured = UNKNOWN_MEASURED
     mean_wall_restitution: Measured = UNKNOWN_MEASURED

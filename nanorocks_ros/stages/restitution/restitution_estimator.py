@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import partial, reduce
+from operator import or_
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.records import (
     NS,
+    UNKNOWN,
     ContactOrFlight,
     CorEstimate,
     CorStatus,
@@ -20,11 +22,13 @@ from nanorocks_ros.records import (
     Rebound,
     SpeedEstimate,
     SpeedMethod,
+    field_names,
 )
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
 from nanorocks_ros.stages.restitution.cycle_speeds import certain_speeds, warnings_of
+from nanorocks_ros.stages.restitution.cycle_sticking import CycleSticking
 from nanorocks_ros.stages.restitution.restitution_methods import (
     LARGEST_TENSION,
     Decay,
@@ -43,6 +47,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 
+# Fields of a `CycleRestitution` that are published under the same name.
+_PUBLISHED = sorted(set(field_names(CycleRestitution)) & set(field_names(CorEstimate)))
 # Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
 _STAMP_ROUNDING_NS = 1_000_000
 # The first speed may come that much later for other reasons than a tray that oscillates.
@@ -76,6 +82,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         self._take(settings)
         self._grains = any(species.properties.shape == 'grain' for species in tray.species)
         self._contacts = CycleContacts(self._settings)
+        self._sticking = CycleSticking(settings, tray)
         self.reset()
 
     def _take(self, settings: PipelineSettings) -> None:
@@ -100,6 +107,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         """
         self._take(settings)
         self._method = self._make_method()
+        self._sticking.adopt(settings)
 
     def _restart(self, stamp_ns: int | None = None) -> None:
         if stamp_ns is not None:
@@ -107,7 +115,8 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         self._samples: list[SpeedEstimate] = []
         self._cycle = 0
         self._finished = True
-        self._merged = False
+        self._sticking.next_cycle()
+        self._early_merges: list[Merge] = []
         self._flags = Quality(0)
         self._last_update_ns: int | None = None
         self._method = self._make_method()
@@ -131,21 +140,21 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         if isinstance(record, SpeedEstimate):
             return self._push_speed(record)
         if isinstance(record, Merge):
-            return self._push_merge(record)
-        self._contacts.push(record)
+            self._push_merge(record)
+        else:
+            self._contacts.push(record)
         return ()
 
-    def _push_merge(self, merge: Merge) -> tuple[CorEstimate, ...]:
-        """End the window where beads began to stick, which is known some time later."""
-        if not self._settings.until_merge or merge.cycle != self._cycle:
-            return ()
-        if not self._finished:
-            self._samples = [
-                sample for sample in self._samples if sample.stamp_ns < merge.stamp_ns
-            ]
-            self._contacts.end_at_merge(merge.stamp_ns)
-            self._merged = True
-        return self._end_cycle()
+    def _push_merge(self, merge: Merge) -> None:
+        """End the decay where beads began to stick, which is known some time later."""
+        if not self._settings.until_merge:
+            return
+        if merge.cycle > self._cycle:
+            # Known before the first speed of its cycle.
+            self._early_merges.append(merge)
+        elif merge.cycle == self._cycle and not self._finished:
+            self._sticking.push_merge(merge)
+            self._contacts.merge(merge)
 
     def _push_speed(self, speed: SpeedEstimate) -> tuple[CorEstimate, ...]:
         estimates: tuple[CorEstimate, ...] = ()
@@ -153,11 +162,17 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
             estimates = self._end_cycle()
             self._cycle, self._samples, self._finished = speed.cycle, [], False
             self._last_update_ns = None
-            self._merged, self._flags = False, Quality(0)
+            self._flags = Quality(0)
             self._contacts.next_cycle()
+            self._sticking.next_cycle()
+            early, self._early_merges = self._early_merges, []
+            for merge in early:
+                self._push_merge(merge)
         if speed.cycle_start_ns is None or self._finished:
             return estimates
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
+        if age > 0.0 and _usable(speed):
+            self._sticking.push_speed(speed)
         if not self._samples and self._driven(speed):
             # A tray that oscillates drives the gas, but a single contact is used as well.
             self._count_contacts(speed)
@@ -228,9 +243,9 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         return True
 
     def _undetermined(self) -> tuple[CorEstimate, ...]:
-        """The estimate of a cycle with too few speeds: undetermined."""
+        """The estimate of a cycle with too few speeds and no contacts: undetermined."""
         stamp_ns = self._samples[-1].stamp_ns if self._samples else self._last_ns
-        if stamp_ns is None or not (self._samples or self._merged):
+        if stamp_ns is None or not (self._samples or self._sticking.first_merge_ns is not None):
             return ()
         return (
             CorEstimate(
@@ -240,30 +255,36 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
                 status=CorStatus.UNDETERMINED,
                 relation=self._method.relation,
                 restitution=UNDETERMINED,
-                samples=len(self._samples),
+                samples=len(self._before_merge()),
             ),
         )
 
+    def _before_merge(self) -> list[SpeedEstimate]:
+        """The speeds of the cycle up to its first merge."""
+        first_ns = self._sticking.first_merge_ns
+        if first_ns is None:
+            return self._samples
+        return [sample for sample in self._samples if sample.stamp_ns < first_ns]
+
     def _estimate(self, status: CorStatus) -> tuple[CorEstimate, ...]:
-        if len(self._samples) < self._settings.min_samples:
+        first_ns, samples = self._sticking.first_merge_ns, self._before_merge()
+        if len(samples) < self._settings.min_samples:
+            samples = []
+        if not self._samples or (not samples and first_ns is None):
             return self._undetermined() if status is CorStatus.FINAL else ()
-        samples = certain_speeds(self._samples)
         last = self._samples[-1]
         shake_ns, start_ns = last.cycle_start_ns or 0, self._start_ns(self._samples[0])
-        decay = self._decay(samples, start_ns)
-        quality = self._flags | warnings_of(samples, self._tray)
+        window = [(sample.stamp_ns - shake_ns) / NS for sample in samples] or [UNKNOWN]
+        samples = certain_speeds(samples)
+        decay = self._decay(samples, start_ns) if samples else None
+        quality = self._flags | warnings_of(samples or self._samples, self._tray)
+        self._contacts.stick(self._sticking.speed_weights(shake_ns))
         outcome, result = self._cycle_restitution(decay, quality, status)
         initial_speeds: tuple[Measured, ...] = ()
         haff_times: tuple[Measured, ...] = ()
-        if status is CorStatus.FINAL:
+        if status is CorStatus.FINAL and decay is not None:
             few = self._settings.min_samples
             initial_speeds, haff_times = species_decays(self._tray, decay.time, samples, few)
-        if result.tension > LARGEST_TENSION:
-            quality |= Quality.INCONSISTENT
-        if result.accelerated:
-            quality |= Quality.ACCELERATED
-        if result.speed_dependent:
-            quality |= Quality.SPEED_DEPENDENT
         return (
             CorEstimate(
                 stamp_ns=last.stamp_ns,
@@ -271,43 +292,27 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
                 cycle=last.cycle,
                 status=outcome,
                 relation=self._method.relation,
-                restitution=result.restitution,
-                initial_speed=result.initial_speed,
-                haff_time=result.haff_time,
-                reduced_chi_square=result.reduced_chi_square,
                 samples=len(samples),
-                mean_restitution=result.mean_restitution,
-                wall_restitution=result.wall_restitution,
-                correlation=result.correlation,
-                paper_restitution=result.paper_restitution,
-                quality=Quality(quality),
-                window_start=(self._samples[0].stamp_ns - shake_ns) / NS,
-                window_end=(last.stamp_ns - shake_ns) / NS,
+                quality=quality | self._quality_of(result),
+                window_start=window[0],
+                window_end=window[-1],
                 cooling_start=(start_ns - shake_ns) / NS,
-                rebounds=result.rebounds,
-                collisions=result.collisions,
-                tension=result.tension,
-                mean_wall_restitution=result.mean_wall_restitution,
+                onset=UNKNOWN if first_ns is None else (first_ns - shake_ns) / NS,
                 species_initial_speeds=initial_speeds,
                 species_haff_times=haff_times,
-                headline=result.headline,
-                joint_restitution=result.joint_restitution,
-                joint_wall_restitution=result.joint_wall_restitution,
-                decay_restitution=result.decay_restitution,
-                decay_wall_restitution=result.decay_wall_restitution,
-                contact_restitution=result.contact_restitution,
-                contact_wall_restitution=result.contact_wall_restitution,
-                wall_friction=result.wall_friction,
-                drag=result.drag,
-                acceleration=result.acceleration,
-                restitution_exponent=result.restitution_exponent,
-                wall_restitution_exponent=result.wall_restitution_exponent,
-                impact_speed=result.impact_speed,
-                wall_impact_speed=result.wall_impact_speed,
-                impact_restitution=result.impact_restitution,
-                wall_impact_restitution=result.wall_impact_restitution,
+                **{name: getattr(result, name) for name in _PUBLISHED},
             ),
         )
+
+    def _quality_of(self, result: CycleRestitution) -> Quality:
+        """What a restitution and the merges say against the decay."""
+        flags = {
+            Quality.INCONSISTENT: result.tension > LARGEST_TENSION,
+            Quality.ACCELERATED: result.accelerated,
+            Quality.SPEED_DEPENDENT: result.speed_dependent,
+            Quality.STICKING: self._sticking.first_merge_ns is not None,
+        }
+        return reduce(or_, [flag for flag, is_set in flags.items() if is_set], Quality(0))
 
     def _decay(self, samples: list[SpeedEstimate], start_ns: int) -> Decay:
         """The speeds of the cycle, with times since the gas began to cool."""
@@ -320,7 +325,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         )
 
     def _cycle_restitution(
-        self, decay: Decay, quality: Quality, status: CorStatus
+        self, decay: Decay | None, quality: Quality, status: CorStatus
     ) -> tuple[CorStatus, CycleRestitution]:
         """The restitution of the cycle and the status of the estimate."""
         if quality & Quality.WRONG_SCALE:
@@ -330,6 +335,9 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         try:
             result = self._method.estimate(decay, self._contacts, final=final)
         except FitError:
+            if self._sticking.first_merge_ns is not None and decay is not None:
+                # Before the first merge there was no time to slow down.
+                return self._cycle_restitution(None, quality, status)
             # The restitution is published as unknown.
             return CorStatus.NO_DECAY, CycleRestitution()
         return status if result.determined else CorStatus.UNDETERMINED, result

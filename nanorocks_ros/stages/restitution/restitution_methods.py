@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+    from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.settings import PipelineSettings
 
@@ -76,8 +77,19 @@ class Decay:
     of_grains: bool = False
 
 
+# For the shape of a likelihood that says nothing.
+_ANY_TIMES = np.linspace(1.0, 10.0, 10)
+_ANY_DECAY = Decay(
+    time=_ANY_TIMES, speed=5e-3 / (1.0 + _ANY_TIMES), error=1e-4 / (1.0 + _ANY_TIMES)
+)
+
+
 class Contacts(Protocol):
     """Contacts and flights of a cycle, as `CycleContacts` sums them."""
+
+    @property
+    def body_rebounds(self) -> int:
+        """Rebounds of bodies of several beads among the contacts."""
 
     @property
     def flights(self) -> NDArray[np.float64]:
@@ -93,8 +105,13 @@ class RestitutionMethod(Protocol):
     relation: CorRelation
     evidence: CycleLikelihoods | None
 
-    def estimate(self, decay: Decay, contacts: Contacts, *, final: bool) -> CycleRestitution:
-        """Restitution of a cycle; raises FitError where there is no decay."""
+    def estimate(
+        self, decay: Decay | None, contacts: Contacts, *, final: bool
+    ) -> CycleRestitution:
+        """Restitution of a cycle; raises FitError where the speeds do not fall.
+
+        Where beads stuck too soon for a decay there are contacts alone.
+        """
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
         """Mean restitution of the cycles of some evidence, also of other recordings."""
@@ -116,7 +133,9 @@ class PaperMethod:
         self._tray = tray
         self.evidence: CycleLikelihoods | None = None
 
-    def estimate(self, decay: Decay, contacts: Contacts, *, final: bool) -> CycleRestitution:
+    def estimate(
+        self, decay: Decay | None, contacts: Contacts, *, final: bool
+    ) -> CycleRestitution:
         """Restitution of a cycle; the method of the paper does not use contacts.
 
         Raises
@@ -125,6 +144,8 @@ class PaperMethod:
             When the speeds do not fall.
         """
         del contacts
+        if decay is None:
+            return CycleRestitution()
         fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
         quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
         spread = math.exp(quantile * fit.log_decay_rate_error)
@@ -205,7 +226,9 @@ class DecayLibraryMethod:
         self.evidence: CycleLikelihoods | None = None
         self._means_so_far = UNKNOWN_MEASURED, UNKNOWN_MEASURED
 
-    def estimate(self, decay: Decay, contacts: Contacts, *, final: bool) -> CycleRestitution:
+    def estimate(
+        self, decay: Decay | None, contacts: Contacts, *, final: bool
+    ) -> CycleRestitution:
         """Restitution of a cycle.
 
         Raises
@@ -213,62 +236,76 @@ class DecayLibraryMethod:
         FitError
             When the speeds do not fall.
         """
-        if (decay.time - decay.time.mean()) @ np.log(decay.speed) >= 0.0:
+        if decay is not None and not _falls(decay):
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         flights = contacts.flights
         losses = flight_losses(flights, self._drag_prior)
         terms = contacts.terms(losses.drag.value)
         friction = friction_weights(self._prior, terms)
-        likelihood = decay_likelihood(
-            self._tables,
-            decay.time,
-            decay.speed,
-            decay.error,
-            self._camera[decay.of_grains],
-            self._drag_of_gas(losses.drag),
-            math.inf if final else friction.highest if friction else 0.0,
-        )
+        highest = math.inf if final else friction.highest if friction else 0.0
+        likelihood = self._likelihood(decay, losses, highest)
         integrated = likelihood.integrated(friction)
-        accelerated = losses.is_accelerated and self._drives(losses, decay)
+        accelerated = losses.is_accelerated and decay is not None and self._drives(losses, decay)
         dependence = self._dependence.of(terms, losses, self._prior, final=final)
         sources = restitution_sources(
             self._tables,
             integrated,
             terms,
             self._prior,
-            decay_counts=not accelerated,
+            decay_counts=decay is not None and not accelerated,
             losses=losses,
             dependence=dependence,
         )
-        best = int(np.argmax(integrated))
         result = replace(
-            self._speeds(decay, final=final),
-            **_by_source(sources, self._ends),
+            self._of_decay(decay, likelihood, integrated, final=final),
+            **_by_source(sources, self._ends, has_decay=decay is not None),
             rebounds=terms.rebounds,
             collisions=terms.collisions,
+            body_rebounds=contacts.body_rebounds,
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
             acceleration=losses.magnitude(self._probability),
             accelerated=accelerated,
             **dependence.fields(self._ends),
-            reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         )
-        restitution, wall_restitution = sources.intervals(self._ends)
-        if sources.means[0].error <= _LARGEST_DEVIATION:
-            result = replace(
-                result,
-                determined=True,
-                restitution=restitution,
-                wall_restitution=wall_restitution,
-                correlation=sources.correlation,
-            )
-        elif sources.headline is Headline.CONTACTS:
-            # Rebounds determine the walls even where nothing is known of the beads.
-            result = replace(result, wall_restitution=wall_restitution)
+        result = _determined(result, sources, self._ends)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
         trusted = trusted and not (accelerated or dependence.is_seen)
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=terms, flights=flights)
         mean, wall_mean = self._means(own, final=final, trusted=trusted)
         return replace(result, mean_restitution=mean, mean_wall_restitution=wall_mean)
+
+    def _likelihood(
+        self, decay: Decay | None, losses: FlightLosses, highest: float
+    ) -> DecayLikelihood:
+        """Likelihood of a decay up to a friction; one that says nothing without a decay."""
+        known = decay or _ANY_DECAY
+        likelihood = decay_likelihood(
+            self._tables,
+            known.time,
+            known.speed,
+            known.error,
+            self._camera[known.of_grains],
+            self._drag_of_gas(losses.drag),
+            highest,
+        )
+        return likelihood.emptied() if decay is None else likelihood
+
+    def _of_decay(
+        self,
+        decay: Decay | None,
+        likelihood: DecayLikelihood,
+        integrated: NDArray[np.float64],
+        *,
+        final: bool,
+    ) -> CycleRestitution:
+        """What the decay alone tells, but for the restitutions."""
+        if decay is None:
+            return CycleRestitution()
+        best = int(np.argmax(integrated))
+        return replace(
+            self._speeds(decay, final=final),
+            reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
+        )
 
     def _drag_of_gas(self, drag: Measured) -> Measured:
         """Drag of the mean speed of all species, from that of the first."""
@@ -367,21 +404,51 @@ class DecayLibraryMethod:
         )
 
 
-def _by_source(sources: RestitutionSources, ends: NDArray[np.float64]) -> dict[str, Any]:
+def _falls(decay: Decay) -> bool:
+    return bool((decay.time - decay.time.mean()) @ np.log(decay.speed) < 0.0)
+
+
+def _determined(
+    result: CycleRestitution, sources: RestitutionSources, ends: NDArray[np.float64]
+) -> CycleRestitution:
+    """The result with the restitutions that the source of the headline determines."""
+    restitution, wall_restitution = sources.intervals(ends)
+    if sources.means[0].error <= _LARGEST_DEVIATION:
+        return replace(
+            result,
+            determined=True,
+            restitution=restitution,
+            wall_restitution=wall_restitution,
+            correlation=sources.correlation,
+        )
+    if result.rebounds:
+        # Rebounds determine the walls even where nothing is known of the beads.
+        return replace(result, wall_restitution=wall_restitution)
+    return result
+
+
+def _by_source(
+    sources: RestitutionSources, ends: NDArray[np.float64], *, has_decay: bool
+) -> dict[str, Any]:
     """The fields of a `CycleRestitution` that say what each source makes of the cycle."""
+    contacts, contact_walls = sources.contact_intervals(ends)
+    fields = {
+        'headline': sources.headline,
+        'contact_restitution': contacts,
+        'contact_wall_restitution': contact_walls,
+        'wall_friction': sources.wall_friction,
+    }
+    if not has_decay:
+        return fields
     joint, joint_walls = intervals_of(sources.joint, ends)
     decay, decay_walls = intervals_of(sources.decay, ends)
-    contacts, contact_walls = sources.contact_intervals(ends)
     return {
-        'headline': sources.headline,
+        **fields,
         'tension': sources.joint.tension,
         'joint_restitution': joint,
         'joint_wall_restitution': joint_walls,
         'decay_restitution': decay,
         'decay_wall_restitution': decay_walls,
-        'contact_restitution': contacts,
-        'contact_wall_restitution': contact_walls,
-        'wall_friction': sources.wall_friction,
     }
 
 

@@ -85,10 +85,11 @@ def wall_prior(prior: PriorSettings) -> WallPrior:
 
 
 def is_decay_left_out(cor: CorEstimate, *, include_inconsistent: bool) -> bool:
-    """Whether a cycle counts with its contacts alone in the means of all cycles."""
+    """Whether a cycle has a decay that does not count in the means of all cycles."""
     return (
         cor.status in (CorStatus.FINAL, CorStatus.UNDETERMINED)
         and cor.headline is Headline.CONTACTS
+        and math.isfinite(cor.window_end)
         and not include_inconsistent
     )
 
@@ -106,7 +107,11 @@ def cycle_as_json(
         'reason': None if reason is None else reason._asdict(),
         'headline': cor.headline.name.lower(),
         'headline_reason': _headline(cor),
-        'contacts': {'rebounds': cor.rebounds, 'collisions': cor.collisions},
+        'contacts': {
+            'rebounds': cor.rebounds,
+            'body_rebounds': cor.body_rebounds,
+            'collisions': cor.collisions,
+        },
         'methods': {method.name.lower(): number for method, number in used.methods.items()},
         'sticking': _sticking(clusters),
     }
@@ -162,7 +167,7 @@ def cycle_lines(
     lines += _exponent_lines(cor)
     lines += _flight_lines(cor)
     lines += _decay_lines(cor)
-    if cor.samples:
+    if cor.samples or cor.rebounds or cor.collisions:
         lines.append(f'  used: {_used_text(cor, used)}')
     if clusters is not None:
         lines.append(f'  sticking: {_sticking(clusters)}')
@@ -309,9 +314,12 @@ def _used_text(cor: CorEstimate, used: UsedSpeeds) -> str:
     window = ''
     if math.isfinite(cor.window_start):
         window = f' from {cor.window_start:.1f} to {cor.window_end:.1f} s after the shaking event'
-    contacts = f', {cor.rebounds} rebounds, {cor.collisions} collisions'
+    of_bodies = f' ({cor.body_rebounds} of bodies)' if cor.body_rebounds else ''
+    contacts = f', {cor.rebounds} rebounds{of_bodies}, {cor.collisions} collisions'
+    if math.isfinite(cor.onset):
+        contacts += f', beads stick from {cor.onset:.1f} s on'
     tension = ''
-    if cor.rebounds or cor.collisions:
+    if math.isfinite(cor.tension) and (cor.rebounds or cor.collisions):
         tension = f'; they and the decay differ by {cor.tension:.1f} standard deviations'
     return f'{cor.samples} speeds{by_methods}{window}{contacts}{tension}'
 

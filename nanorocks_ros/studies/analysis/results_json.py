@@ -195,6 +195,7 @@ def _cycle_as_json(
         'start': start,
         **_elements(cor, _RESTITUTIONS),
         'rebounds': cor.rebounds,
+        'body_rebounds': cor.body_rebounds,
         'collisions': cor.collisions,
         'tension': finite_or_none(cor.tension),
         'quality': int(cor.quality),

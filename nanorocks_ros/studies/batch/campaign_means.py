@@ -276,11 +276,12 @@ def _sticking(arrays: Mapping[str, NDArray[Any]], number: int) -> list[StickingC
     for name, values in _below(arrays, f'{number}/sticking/').items():
         cycle, _, field_name = name.partition('/')
         by_cycle.setdefault(cycle, {})[field_name] = values
-    names = {field.name for field in fields(StickingCycle)}
+    # Results of earlier versions have no collisions.
+    names = {field.name for field in fields(StickingCycle) if field.name != 'bounces'}
     return [
         StickingCycle(**by_cycle[cycle])
         for cycle in sorted(by_cycle)
-        if names == {*by_cycle[cycle]}
+        if names == {*by_cycle[cycle]} - {'bounces'}
     ]
 
 

@@ -496,42 +496,37 @@ def as_known(records):
     )
 
 
-def test_the_window_ends_with_the_first_merge():
+def test_the_decay_ends_with_the_first_merge():
     speeds = simulated_cycle()
     *_, cut = all_estimates(fitter(**{'cooling.duration': 12.0}), speeds)
     estimates = all_estimates(fitter(), as_known([*speeds, merge(12.05), merge(14.0)]))
-    finals = [record for record in estimates if record.status is CorStatus.FINAL]
-    assert len(finals) == 1
-    assert finals[0] == cut
+    (final,) = [record for record in estimates if record.status is CorStatus.FINAL]
+    assert final.onset == pytest.approx(12.05)
+    assert (final.window_end, final.samples) == (cut.window_end, cut.samples)
+    assert final.decay_restitution == cut.decay_restitution
+    assert final.quality == Quality.STICKING
     *_, later = all_estimates(fitter(**{'cooling.until_merge': False}), [*speeds, merge(12.05)])
     assert later.window_end == pytest.approx(20.0, abs=0.11)
+    assert math.isnan(later.onset)
 
 
-def test_contacts_since_a_merge_that_is_known_late_are_not_used():
-    rng = np.random.default_rng(5)
-    before, since = (
-        list(wall_rebounds(rng, 20, 2.0, 11.0)),
-        list(wall_rebounds(rng, 30, 12.0, 15.0)),
-    )
-    late = merge(12.05, known=6.0)
-    finals = [
-        all_estimates(fitter(), as_known([*simulated_cycle(), *contacts, late]))[-1]
-        for contacts in (before, [*before, *since])
-    ]
-    assert finals[0].status is CorStatus.FINAL
-    assert [final.rebounds for final in finals] == [20, 20]
-    # Sums in another order differ by rounding.
-    walls = [final.wall_restitution.value for final in finals]
-    assert walls[1] == pytest.approx(walls[0], abs=1e-9)
-
-
-def test_a_gas_whose_beads_stick_at_once_tells_nothing():
+def test_a_gas_whose_beads_stick_at_once_and_meet_nothing_tells_nothing():
     for time in (0.5, 2.0):
-        (only,) = all_estimates(fitter(), as_known([*simulated_cycle(), merge(time, known=0.4)]))
-        assert only.status is CorStatus.UNDETERMINED
-        assert (only.restitution.lower, only.restitution.upper) == (0.0, 1.0)
-        assert math.isnan(only.restitution.value)
-        assert only.cycle == 1
+        estimates = all_estimates(fitter(), as_known([*simulated_cycle(), merge(time, known=0.4)]))
+        assert {estimate.status for estimate in estimates} == {CorStatus.UNDETERMINED}
+        last = estimates[-1]
+        assert (last.restitution.lower, last.restitution.upper) == (0.0, 1.0)
+        assert math.isnan(last.restitution.value)
+        assert last.headline is Headline.CONTACTS
+        assert math.isnan(last.decay_restitution.lower)
+        assert last.cycle == 1
+
+
+def test_a_merge_that_is_known_before_the_first_speed_of_its_cycle_counts():
+    first = merge(0.05)
+    *_, final = all_estimates(fitter(), [first, *simulated_cycle()])
+    assert final.onset == pytest.approx(0.05)
+    assert final.samples == 0
 
 
 def test_a_merge_of_another_cycle_ends_no_window():

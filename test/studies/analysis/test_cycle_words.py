@@ -287,7 +287,7 @@ def test_the_json_says_the_same_as_the_terminal():
         words.text for words in flags_in_words(cor.quality)
     ]
     assert (values['headline'], values['headline_reason']) == ('contacts', 'contacts alone')
-    assert values['contacts'] == {'rebounds': 20, 'collisions': 31}
+    assert values['contacts'] == {'rebounds': 20, 'body_rebounds': 0, 'collisions': 31}
     assert values['reason'] is None
     assert values['sticking'].startswith('beads stick below 3.1 mm/s')
     results = TrayResults([speed(2.0 + k) for k in range(19)])
@@ -295,3 +295,26 @@ def test_the_json_says_the_same_as_the_terminal():
     tray = as_json(Analysis(epoch_ns=0, trays={1: results}))['trays']['1']
     assert tray['decays_left_out'] == 1
     assert tray['cycles'][0]['flags'] == [{**flag, 'speeds': None} for flag in values['flags']]
+
+
+def test_what_counts_where_beads_stick_is_said():
+    cor = replace(
+        FINAL,
+        quality=Quality.STICKING,
+        headline=Headline.CONTACTS,
+        samples=0,
+        window_start=float('nan'),
+        window_end=float('nan'),
+        tension=float('nan'),
+        onset=0.42,
+        body_rebounds=9,
+    )
+    text = text_of(cor)
+    assert 'from contacts alone, since beads stick' in text
+    assert 'used: 0 speeds, 20 rebounds (9 of bodies), 31 collisions' in text
+    assert 'beads stick from 0.4 s on' in text
+    assert 'nan' not in text
+    assert 'flag sticking' in text
+    unknown = replace(cor, status=CorStatus.UNDETERMINED, collisions=0)
+    assert 'COR unknown, walls 0.971 [0.966, 0.976]' in text_of(unknown)
+    assert '20 rebounds and 0 collisions tell too little of the beads' in text_of(unknown)
