@@ -54,6 +54,7 @@ class _SeenContacts:
     """Contacts of a cycle, as the stage of restitutions sums them."""
 
     contacts: Contacts
+    body_rebounds = 0
 
     @property
     def flights(self) -> NDArray[np.float64]:

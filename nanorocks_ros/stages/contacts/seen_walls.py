@@ -117,6 +117,9 @@ def _wall(edges: list[tuple[float, float]], *, outward: bool) -> tuple[float, in
     ends = np.searchsorted(places, places + width, side='right')
     counts = ends - np.arange(places.size)
     crowded = np.flatnonzero(counts >= max(_LEAST_TURNS, 0.3 * counts.max()))
+    if not crowded.size:
+        # Turns everywhere on the side, such as of beads that rattle among others.
+        return math.nan, 0
     first = int(crowded[0])
     place = float(np.median(places[first : ends[first]]))
     return (-place if outward else place), int(counts[first])

@@ -40,3 +40,12 @@ def test_a_bead_that_turns_twice_shows_no_wall():
         list(tracks_of(np.stack([x, y], axis=1)[:, None], jitter=0.02 * PIXEL)), TRAY
     )
     assert not walls.any
+
+
+def test_beads_that_turn_at_places_of_their_own_show_no_wall():
+    """As in a crowd that rattles: each turns back from its neighbours."""
+    turns = np.array([0.004, 0.008, 0.012, 0.016])
+    x = turns[None, :] + 0.006 * np.abs(TIME[:, None] - 4.0)
+    y = np.broadcast_to(np.linspace(0.004, 0.022, 4), x.shape)
+    walls = seen_walls(list(tracks_of(np.stack([x, y], axis=2), jitter=0.02 * PIXEL)), TRAY)
+    assert not walls.any
