@@ -60,7 +60,7 @@ def test_every_node_is_an_executable():
 def test_an_executable_runs_the_node_of_its_name(name):
     text = (ROOT / 'scripts' / name).read_text()
     assert text.startswith('#!/usr/bin/env python3\n')
-    assert f"run('{name}')" in text
+    assert f"main('{name}')" in text
 
 
 def test_shared_files_are_installed_as_files(monkeypatch):

@@ -47,11 +47,13 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
+    from nanorocks_ros.cli.film_options import print_notices, use_described_film
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
+    print_notices(use_described_film(options, Path(options.bag)))
     bag = tracked_bag(options)
     compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:
@@ -64,12 +66,10 @@ def run(options: argparse.Namespace) -> int:
 
 def tracked_bag(options: argparse.Namespace) -> TrackedBag:
     """Track the beads of the bag of the options, with progress; print what is to be known."""
-    from nanorocks_ros.cli.film_options import print_notices, use_described_film
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 
-    print_notices(use_described_film(options, Path(options.bag)))
     settings, assumed, _ = bag_settings(options, options.bag)
     with Progress('tracking') as progress:
         bag = track_bag(

@@ -250,13 +250,12 @@ def test_invalid_messages_and_topic_names_are_skipped(graph, tmp_path):
     played = [stamp_of(message.header.stamp) for message in received]
     assert [stamp_ns - played[0] for stamp_ns in played] == stamps
     lines = ended.output.splitlines()
-    assert len(lines) == 4
+    assert len(lines) == 3
     assert '/1st name: not a valid ROS topic name; the topic is not played' in lines[0]
-    for line, size in zip(lines[1:3], (6, 0), strict=True):
-        invalid = f'{name}: a message of {size} bytes is not a valid {topics.COMPRESSED}; record'
-        assert invalid in line
+    # Of the two that differ in their size alone, the first.
+    assert f'{name}: a message of 6 bytes is not a valid {topics.COMPRESSED}; record' in lines[1]
     # What the reader says of a message that is cut off.
-    assert topics.COMPRESSED in lines[3]
+    assert topics.COMPRESSED in lines[2]
 
 
 def test_the_bag_player_gives_the_clock_and_starts_again_at_the_end(graph):

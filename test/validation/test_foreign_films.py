@@ -6,7 +6,7 @@ from shared_films import foreign_film
 
 from benchmarks.film_measurement import is_flagged, measure
 from benchmarks.film_truth import read_truth
-from nanorocks_ros.records import CorStatus
+from nanorocks_ros.records import CorStatus, Headline, Quality
 
 
 def measured(name):
@@ -42,6 +42,13 @@ def test_a_codec_and_a_camera_that_jitters_leave_one_cycle_and_its_restitution(n
 
 
 def test_clusters_that_turn_are_not_taken_for_a_gas():
-    _, result = measured('s1_turn')
+    """Contacts of free beads tell the restitutions; the decay counts until the first merge."""
+    film, result = measured('s1_turn')
     (cycle,) = result.cycles
-    assert cycle.status is CorStatus.UNDETERMINED
+    assert cycle.quality & Quality.STICKING
+    assert cycle.headline is Headline.CONTACTS
+    for interval, truth in (
+        (cycle.wall_restitution, film.walls),
+        (cycle.restitution, film.beads),
+    ):
+        assert interval.lower <= truth <= interval.upper

@@ -32,7 +32,8 @@ def damage_notices(index: McapIndex) -> list[str]:
         notices.append(f'{_blocks(len(index.disagreements))} differ from their message indexes')
     if index.catalogue.contradictions:
         notices.append(
-            f'{len(index.catalogue.contradictions)} topics or types are stated twice, differently'
+            'statements of a topic or a type that contradict an earlier one: '
+            f'{len(index.catalogue.contradictions)}'
         )
     if index.wrong_checksum:
         notices.append('its data differ from their checksum; single messages may be wrong')

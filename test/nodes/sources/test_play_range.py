@@ -103,8 +103,9 @@ def test_what_is_lost_is_logged_once_after_the_pass_in_which_it_was_found(tmp_pa
     for begin_ns in itertools.islice(play_range.starts(100 * NS + 1), 4):
         lines.append((begin_ns - 100 * NS, len(logger.lines)))
         assert not list(reader.messages(NAMES, begin_ns, play_range.last_ns))
-    assert lines == [(1, 0), (0, 1), (0, 1), (0, 1)]
-    assert 'at least 3 messages are lost' in logger.lines[0]
+    said = len(logger.lines)
+    assert lines == [(1, 0), (0, said), (0, said), (0, said)]
+    assert sum('at least 3 messages are lost' in line for line in logger.lines) == 1
 
 
 def test_without_a_loop_there_is_one_pass_and_what_is_lost_is_logged_after_it(tmp_path):
@@ -112,7 +113,7 @@ def test_without_a_loop_there_is_one_pass_and_what_is_lost_is_logged_after_it(tm
     for _ in play_range.starts():
         assert not list(reader.messages(NAMES, play_range.first_ns, play_range.last_ns))
         assert not logger.lines
-    assert len(logger.lines) == 1
+    assert sum('at least 3 messages are lost' in line for line in logger.lines) == 1
 
 
 def test_an_end_as_it_is_shown_is_in_the_range(tmp_path):

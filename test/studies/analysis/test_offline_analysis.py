@@ -259,7 +259,7 @@ def text_file(path):
         (text_file, 'not a bag'),
         (empty_bag, 'holds no messages'),
         (other_bag, r'(found '),
-        (lambda path: raw_bag(path, at_30_hz(3), encoding='bayer_rggb8'), 'bayer_rggb8'),
+        (lambda path: raw_bag(path, at_30_hz(3), encoding='bayer_rggb16'), 'bayer_rggb16'),
     ],
     ids=['missing', 'no bag', 'empty', 'no camera', 'encoding'],
 )
