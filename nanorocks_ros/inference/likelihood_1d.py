@@ -64,6 +64,13 @@ class Posterior1D:
             restitution=0.5 * (edges[1:] + edges[:-1]), probability=np.diff(below) / below[-1]
         )
 
+    def weighted(self, mean: float, deviation: float) -> Posterior1D:
+        """The posterior where something else tells the restitution with a Gaussian error."""
+        weight = np.exp(-0.5 * ((self.restitution - mean) / deviation) ** 2) * self.probability
+        if not weight.sum() > 0.0:
+            return self
+        return Posterior1D(restitution=self.restitution, probability=weight / weight.sum())
+
     def _below(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Probability below some places, (n,); each entry extends half way to its neighbours."""
         axis = self.restitution

@@ -70,3 +70,14 @@ def test_a_mixture_has_the_mean_and_the_quantiles_of_both():
     assert mixture.quantiles(np.array([0.375, 0.875])) == pytest.approx([0.4, 0.8], abs=2e-3)
     assert first.mixed_with(second, 0.0).mean == pytest.approx(0.4, abs=1e-3)
     assert mixture.probability.sum() == pytest.approx(1.0)
+
+
+def test_a_posterior_weighted_with_a_gaussian_is_the_product_of_both():
+    axis = np.linspace(0.0, 1.0, 2001)
+    own = np.exp(-0.5 * ((axis - 0.8) / 0.03) ** 2)
+    posterior = Posterior1D(restitution=axis, probability=own / own.sum())
+    product = posterior.weighted(0.9, 0.04)
+    assert product.mean == pytest.approx((0.8 / 0.03**2 + 0.9 / 0.04**2) / (0.03**-2 + 0.04**-2))
+    assert product.deviation == pytest.approx((0.03**-2 + 0.04**-2) ** -0.5, rel=1e-3)
+    # Where both exclude each other the posterior is believed.
+    assert posterior.weighted(5.0, 0.01).mean == pytest.approx(posterior.mean)

@@ -59,7 +59,7 @@ def test_the_json_contract_holds_without_a_bag(capsys):
     assert (values['tray'], values['runs'], values['seed']) == (3, 4, 7)
     assert values['settings']['wall_restitution'] == 0.9
     assert isinstance(values['events'], int)
-    assert 0.0 < values['cpu_seconds'] < 10.0
+    assert values['cpu_seconds'] > 0.0
     curves = [values[name] for name in ('time', 'mean_speed', 'mean_projected_speed', 'bodies')]
     assert [len(curve) for curve in curves] == [181] * 4
     time_, speed, projected, bodies = map(np.array, curves)
