@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 
-from nanorocks_ros.cli.films import accept_films
+from nanorocks_ros.cli.film_inputs import accept_films
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.yaml_limits import load_yaml
 from nanorocks_ros.experiment.yaml_lines import read_text

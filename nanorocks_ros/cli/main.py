@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
-from nanorocks_ros.cli.films import use_imports
+from nanorocks_ros.cli.film_inputs import use_imports
 from nanorocks_ros.cli.remedies import with_own_files
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
 
@@ -38,15 +38,15 @@ COMMANDS = {
     'info': 'recordings.info',
     'library': 'calibration.library',
     'look': 'look',
-    'measure': 'measure',
+    'measure': 'films.measure',
     'reproduce': 'reproduce',
     'salvage': 'recordings.salvage',
     'simulate': 'simulation.simulate',
     'speeds': 'speeds',
     'statistics': 'statistics',
     'sweep': 'simulation.sweep',
-    'track': 'track',
-    'tray': 'tray',
+    'track': 'films.track',
+    'tray': 'films.tray',
 }
 """By command, the module of `nanorocks_ros.cli` that adds its parser; in the order of the help."""
 

@@ -61,7 +61,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, print and write, and return the exit code."""
-    from nanorocks_ros.cli.track import tracked_bag
+    from nanorocks_ros.cli.films.track import tracked_bag
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.gas_statistics.statistics_files import statistics_values
     from nanorocks_ros.studies.gas_statistics.tray_statistics import GasChoices

@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.cli.films import accept_films
+from nanorocks_ros.cli.film_inputs import accept_films
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import finite_or_none
 

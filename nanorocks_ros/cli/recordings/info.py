@@ -20,7 +20,7 @@ _MB = 1e6
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.films import accept_films
+    from nanorocks_ros.cli.film_inputs import accept_films
 
     parser = commands.add_parser('info', help='show the contents of a bag and its problems')
     parser.add_argument(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nanorocks_ros.cli.film_options import filmed_tray
+from nanorocks_ros.cli.films.film_options import filmed_tray
 from nanorocks_ros.cli.main import build_parser
 from nanorocks_ros.errors import ConfigurationError
 

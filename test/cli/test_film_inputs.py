@@ -7,7 +7,7 @@ import json
 import pytest
 from videos import write_video
 
-from nanorocks_ros.cli.films import use_imports
+from nanorocks_ros.cli.film_inputs import use_imports
 from nanorocks_ros.cli.main import build_parser, main
 
 

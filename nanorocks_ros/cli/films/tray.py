@@ -1,6 +1,6 @@
 """``nanorocks tray FILM -o mine.yaml``: describe beads and container of a film, in a trays file.
 
-Tested by ``test/cli/test_tray.py``.
+Tested by ``test/cli/films/test_tray.py``.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ What is not told is guessed, and a line says so. Corners and beads are given in 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.film_options import add_film_options
-    from nanorocks_ros.cli.films import accept_films
+    from nanorocks_ros.cli.film_inputs import accept_films
+    from nanorocks_ros.cli.films.film_options import add_film_options
 
     parser = commands.add_parser(
         'tray',
@@ -64,7 +64,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Describe, recognise, write, and return the exit code."""
-    from nanorocks_ros.cli.film_options import filmed_tray, print_notices
+    from nanorocks_ros.cli.films.film_options import filmed_tray, print_notices
     from nanorocks_ros.outputs.atomic_files import write_bytes
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.measure.film_samples import film_samples

@@ -36,7 +36,7 @@ the folder. Exit code 3: done, but the beads are not recognised well enough.
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.film_options import add_film_options
+    from nanorocks_ros.cli.films.film_options import add_film_options
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
     """Settings of the film: by its options, by a trays file, or by what the bag says."""
-    from nanorocks_ros.cli.film_options import print_notices, use_described_film
+    from nanorocks_ros.cli.films.film_options import print_notices, use_described_film
     from nanorocks_ros.cli.flags import bag_settings
 
     print_notices(use_described_film(options, bag))

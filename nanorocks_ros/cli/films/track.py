@@ -25,7 +25,7 @@ _PERCENT = 100.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.film_options import add_film_options
+    from nanorocks_ros.cli.films.film_options import add_film_options
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser('track', help='track all beads of a film or bag')
@@ -47,7 +47,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
-    from nanorocks_ros.cli.film_options import print_notices, use_described_film
+    from nanorocks_ros.cli.films.film_options import print_notices, use_described_film
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
