@@ -56,12 +56,12 @@ def guessed_diameter(frames: Sequence[NDArray[np.uint8]]) -> float:
     for frame in frames:
         candidates = model.candidates(np.ascontiguousarray(frame))
         radii.append(candidates.outlines.discs[model.alike(candidates), 2])
-    found = np.concatenate(radii)
-    if not found.size:
+    all_radii = np.concatenate(radii)
+    if not all_radii.size:
         raise ConfigurationError(
             '--diameter-px', 'cannot be guessed: no discs of one size stand out', 'measure a bead'
         )
-    return 2.0 * float(np.median(found))
+    return 2.0 * float(np.median(all_radii))
 
 
 def colour_at(frame: NDArray[np.uint8], place: tuple[float, float], diameter: float) -> str:

@@ -37,7 +37,7 @@ _LAYER, _LAYER_APART = 1.25, 1.25
 _SUBPIXEL_BITS = 4
 
 
-class _Found(NamedTuple):
+class _RankedDiscs(NamedTuple):
     """Discs of one species in a frame: column, row, radius; errors; support; how good they are."""
 
     discs: NDArray[np.float64]
@@ -46,8 +46,8 @@ class _Found(NamedTuple):
     support: NDArray[np.float64]
     score: NDArray[np.float64]
 
-    def chosen(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> _Found:
-        return _Found(*(values[rows] for values in self))
+    def chosen(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> _RankedDiscs:
+        return _RankedDiscs(*(values[rows] for values in self))
 
 
 class SceneDetector:
@@ -98,14 +98,14 @@ class SceneDetector:
         """
         color = np.ascontiguousarray(color)
         self._learn_on(color)
-        found = []
+        of_species = []
         for k, model in enumerate(self._models):
             known = hints[k][:, :3] - [0.5, 0.5, 0.0] if len(hints) else None
-            found.append(self._of_species(k, model, color, known))
+            of_species.append(self._of_species(k, model, color, known))
             if self._frames % _FOLLOWING_FRAMES == 0:
                 model.colours.follow(color)
         self._frames += 1
-        return tuple(_detections(rows) for rows in self._best_of_species(found))
+        return tuple(_detections(rows) for rows in self._best_of_species(of_species))
 
     def _learn_on(self, color: NDArray[np.uint8]) -> None:
         """Keep frames spread over the film so far, and learn from them again as it grows."""
@@ -128,7 +128,7 @@ class SceneDetector:
         model: SceneModel,
         color: NDArray[np.uint8],
         hints: NDArray[np.float64] | None,
-    ) -> _Found:
+    ) -> _RankedDiscs:
         """Discs that look like beads of a species, the best first."""
         candidates = model.candidates(color, hints)
         outlines = candidates.outlines
@@ -137,14 +137,14 @@ class SceneDetector:
         nearer = distances[:, k] <= self._colour_distances(candidates.around)[:, k]
         alike = model.alike(candidates) & nearer & (np.argmin(distances, axis=1) == k)
         alike &= self._is_allowed(outlines.discs, color.shape)
-        found = _Found(
+        discs = _RankedDiscs(
             outlines.discs,
             np.hypot(outlines.errors, _LEAST_ERROR_PX),
             outlines.radius_errors,
             outlines.support,
             outlines.support * np.minimum(outlines.steps, 1.0),
         ).chosen(alike)
-        return found.chosen(np.argsort(-found.score, kind='stable'))
+        return discs.chosen(np.argsort(-discs.score, kind='stable'))
 
     def _colour_distances(self, colours: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance of each colour to that of each species; 0 where none is told, (n, species)."""
@@ -180,7 +180,7 @@ class SceneDetector:
         places = (np.array(corners) * self._scale - 0.5) * 2**_SUBPIXEL_BITS
         cv2.fillPoly(picture, [np.rint(places).astype(np.int32)], value, shift=_SUBPIXEL_BITS)
 
-    def _best_of_species(self, found: list[_Found]) -> list[_Found]:
+    def _best_of_species(self, found: list[_RankedDiscs]) -> list[_RankedDiscs]:
         """At most as many discs as told, and each place for the species that fits it best."""
         best = []
         for k, rows in enumerate(found):
@@ -210,7 +210,7 @@ def _look(tray: Tray, species: Species, pixels_per_metre: float) -> BeadLook:
     )
 
 
-def _detections(found: _Found) -> Detections:
+def _detections(found: _RankedDiscs) -> Detections:
     return Detections(
         # The centre of the first pixel is at (0.5, 0.5).
         positions=found.discs[:, :2] + 0.5,
