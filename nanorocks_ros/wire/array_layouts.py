@@ -1,4 +1,9 @@
-"""Conversion of records to arrays and back, by the layouts in ``msg_defs``."""
+"""Conversion of records to arrays and back, by the layouts in ``msg_defs``.
+
+An array holds the numbers of a message definition as float32. A time is declared float64, of
+which float32 keeps seven digits: 8 ms after a day. Such a field is therefore followed, at the end
+of the array, by an element ``NAME_remainder`` to be added to it.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +31,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.wire.flat_records import flat_value, nested_fields
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -51,16 +56,83 @@ _STAMPS = {
     'known': 'known_ns',
     'first_merge': 'first_merge_ns',
 }
-_FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
-_CONSTANT = re.compile(r'^float32\s+([A-Z]\w*)\s*=\s*(\d+)$')
+_NUMBER = r'(u?int\d+|float\d+|bool)'
+_FIELD = re.compile(rf'^{_NUMBER}\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
+_CONSTANT = re.compile(rf'^{_NUMBER}\s+([A-Z]\w*)\s*=\s*(\d+)$')
+_REMAINDER = '_remainder'
 
 
 class LayoutField(NamedTuple):
-    """One element of an array: its name, unit and meaning."""
+    """One number of a message definition: its type (such as float32), name, unit and meaning."""
 
+    number: str
     name: str
     unit: str
     doc: str
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether a second element of the array holds what float32 leaves out of the first."""
+        return self.number == 'float64'
+
+    @property
+    def python_type(self) -> type[float | int | bool]:
+        """The type of its values."""
+        if self.number.startswith('float'):
+            return float
+        return bool if self.number == 'bool' else int
+
+    def remainder(self) -> LayoutField:
+        """That second element."""
+        doc = f'to be added to {self.name}: what float32 leaves out of it'
+        return LayoutField('float32', self.name + _REMAINDER, self.unit, doc)
+
+
+def array_elements(fields: Iterable[LayoutField]) -> tuple[LayoutField, ...]:
+    """The elements of the array of some fields: these, then the remainders of the exact ones."""
+    fields = tuple(fields)
+    return (*fields, *(field.remainder() for field in fields if field.is_exact))
+
+
+def rounded_elements(
+    fields: Iterable[LayoutField], values: Iterable[float]
+) -> NDArray[np.float32]:
+    """The array of the values of some fields: rounded, then the remainders of the exact ones.
+
+    Parameters
+    ----------
+    fields : iterable of LayoutField, (n_fields,)
+    values : iterable of float, (n_fields,)
+
+    Returns
+    -------
+    ndarray of float32, (n_elements,)
+        In the order of `array_elements`.
+    """
+    exact = np.array([field.is_exact for field in fields])
+    numbers = np.fromiter(values, dtype=np.float64, count=len(exact))
+    rounded = numbers.astype(np.float32)
+    return np.append(rounded, (numbers[exact] - rounded[exact]).astype(np.float32))
+
+
+def exact_values(
+    fields: Sequence[LayoutField], elements: Sequence[float] | NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
+    """The values of some fields in an array of `rounded_elements`.
+
+    Parameters
+    ----------
+    fields : sequence of LayoutField, (n_fields,)
+    elements : sequence of float, (n_elements,)
+
+    Returns
+    -------
+    ndarray of float64, (n_fields,)
+    """
+    numbers = np.asarray(elements, dtype=np.float64)
+    values = numbers[: len(fields)].copy()
+    values[[field.is_exact for field in fields]] += numbers[len(fields) :]
+    return values
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +146,7 @@ class Layout:
     doc : str
         First sentence of the definition.
     fields : tuple of LayoutField
+        The numbers of the definition.
     constants : dict of str to int
     """
 
@@ -83,9 +156,19 @@ class Layout:
     constants: dict[str, int]
 
     @property
+    def elements(self) -> tuple[LayoutField, ...]:
+        """The elements of the array: the fields, then the remainders of times."""
+        return array_elements(self.fields)
+
+    @property
+    def labels(self) -> list[str]:
+        """The names of the elements."""
+        return [element.name for element in self.elements]
+
+    @property
     def label(self) -> str:
-        """Comma-separated field names: ``layout.dim[0].label`` of the array."""
-        return ','.join(field.name for field in self.fields)
+        """The same, separated by commas: ``layout.dim[0].label`` of the array."""
+        return ','.join(self.labels)
 
 
 def layout(record_type: type[ArrayRecord]) -> Layout:
@@ -98,7 +181,7 @@ def _layout(name: str) -> Layout:
     text = resources.files(__package__).joinpath('msg', f'{name}.msg').read_text('utf-8')
     lines = [line.strip() for line in text.splitlines()]
     fields = [LayoutField(*match.groups()) for line in lines if (match := _FIELD.match(line))]
-    constants = [match.groups() for line in lines if (match := _CONSTANT.match(line))]
+    constants = [match.group(2, 3) for line in lines if (match := _CONSTANT.match(line))]
     return Layout(
         name=name,
         doc=lines[0].removeprefix('# '),
@@ -118,18 +201,44 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
     Returns
     -------
-    ndarray of float32, (n_fields,)
+    ndarray of float32, (n_elements,)
         NaN where a value is not known.
     """
-    values = [_element(record, field.name, epoch_ns) for field in layout(type(record)).fields]
-    return np.array(values, dtype=np.float32)
+    fields = layout(type(record)).fields
+    return rounded_elements(fields, (field_value(record, field, epoch_ns) for field in fields))
 
 
-def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
+def field_value(record: ArrayRecord, field: LayoutField, epoch_ns: int) -> float:
+    """The number that a record holds in a field of its layout; NaN where it is not known.
+
+    Parameters
+    ----------
+    record : any of ArrayRecord
+    field : LayoutField
+    epoch_ns : int, [ns]
+        What `time` counts from.
+    """
+    name = field.name
     value = flat_value(record, _STAMPS.get(name, name))
     if value is None:
         return math.nan
     return (value - epoch_ns) / NS if name in _STAMPS else float(value)
+
+
+def enumerated(record: ArrayRecord) -> dict[str, str | list[str]]:
+    """The words of the enumerations in a record, by the name of their field in typed messages.
+
+    ``status_name`` is the name of ``status`` in lower case, ``quality_names`` a list of flags.
+    """
+    words: dict[str, str | list[str]] = {}
+    for field in layout(type(record)).fields:
+        if field.name in _ENUMERATIONS:
+            value = flat_value(record, field.name)
+            if isinstance(value, Quality):
+                words[f'{field.name}_names'] = value.names()
+            else:
+                words[f'{field.name}_name'] = value.name.lower()
+    return words
 
 
 def from_array(
@@ -157,17 +266,18 @@ def from_array(
     FrameError
         When the number of elements is not that of the layout or a stamp is missing.
     """
-    fields = layout(record_type).fields
-    if len(values) != len(fields):
+    fields, elements = layout(record_type).fields, layout(record_type).elements
+    if len(values) != len(elements):
         raise FrameError(
             where,
-            f'{len(values)} elements where {record_type.__name__} has {len(fields)}',
+            f'{len(values)} elements where {record_type.__name__} has {len(elements)}',
             'use the same release of nanorocks_ros on both sides',
         )
     if not math.isfinite(values[0]):
         raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
     kinds = {field.name: field.type for field in dataclasses.fields(record_type)}
-    numbers = {field.name: float(value) for field, value in zip(fields, values, strict=True)}
+    exact = exact_values(fields, values).tolist()
+    numbers = {field.name: value for field, value in zip(fields, exact, strict=True)}
     items: dict[str, Any] = {'tray': tray, **nested_fields(record_type, numbers)}
     for name, number in numbers.items():
         in_record = _STAMPS.get(name, name)

@@ -199,7 +199,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
         for name, record in heapq.merge(*streams, key=lambda item: item[1].stamp_ns):
             values = to_array(record, analysis.epoch_ns)
-            labels = [field.name for field in layout(type(record)).fields]
+            labels = layout(type(record)).labels
             bag.write(name, record.stamp_ns, float_array_message(labels, values))
 
 

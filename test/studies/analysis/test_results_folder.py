@@ -94,7 +94,7 @@ def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
     analysed = analysis()
     for product in MEASURED:
         if not analysed.trays[5].of(product.record):
-            values = np.ones(len(layout(product.record).fields))
+            values = np.ones(len(layout(product.record).elements))
             analysed.trays[5].add(
                 from_array(product.record, values, tray=5, epoch_ns=0, where='test')
             )
