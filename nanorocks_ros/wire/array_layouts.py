@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord
 
 
-_ENUMERATIONS = {
+ENUMERATIONS = {
     'method': SpeedMethod,
     'quality': Quality,
     'status': CorStatus,
@@ -47,15 +47,16 @@ _ENUMERATIONS = {
     'size_status': SizeStatus,
     'sticking_status': StickingStatus,
 }
+"""What the numbers of a field stand for, by the name of the field."""
 # By the type that a record declares.
 _WHOLE = {'int': int, 'bool': bool}
-# Fields of the array that a record keeps as an integer stamp.
-_STAMPS = {
+STAMPS = {
     'time': 'stamp_ns',
     'cycle_start': 'cycle_start_ns',
     'known': 'known_ns',
     'first_merge': 'first_merge_ns',
 }
+"""Fields that a record keeps as an integer stamp, and the names of the stamps."""
 _NUMBER = r'(u?int\d+|float\d+|bool)'
 _FIELD = re.compile(rf'^{_NUMBER}\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
 _CONSTANT = re.compile(rf'^{_NUMBER}\s+([A-Z]\w*)\s*=\s*(\d+)$')
@@ -219,10 +220,10 @@ def field_value(record: ArrayRecord, field: LayoutField, epoch_ns: int) -> float
         What `time` counts from.
     """
     name = field.name
-    value = flat_value(record, _STAMPS.get(name, name))
+    value = flat_value(record, STAMPS.get(name, name))
     if value is None:
         return math.nan
-    return (value - epoch_ns) / NS if name in _STAMPS else float(value)
+    return (value - epoch_ns) / NS if name in STAMPS else float(value)
 
 
 def enumerated(record: ArrayRecord) -> dict[str, str | list[str]]:
@@ -232,7 +233,7 @@ def enumerated(record: ArrayRecord) -> dict[str, str | list[str]]:
     """
     words: dict[str, str | list[str]] = {}
     for field in layout(type(record)).fields:
-        if field.name in _ENUMERATIONS:
+        if field.name in ENUMERATIONS:
             value = flat_value(record, field.name)
             if isinstance(value, Quality):
                 words[f'{field.name}_names'] = value.names()
@@ -280,7 +281,7 @@ def from_array(
     numbers = {field.name: value for field, value in zip(fields, exact, strict=True)}
     items: dict[str, Any] = {'tray': tray, **nested_fields(record_type, numbers)}
     for name, number in numbers.items():
-        in_record = _STAMPS.get(name, name)
+        in_record = STAMPS.get(name, name)
         if in_record in items or in_record not in kinds:
             continue
         try:
@@ -296,8 +297,8 @@ def from_array(
 
 
 def _value(name: str, kind: object, value: float, epoch_ns: int) -> object:
-    if name in _STAMPS:
+    if name in STAMPS:
         return epoch_ns + round(value * NS) if math.isfinite(value) else None
     if kind in _WHOLE:
         return _WHOLE[kind](value)
-    return _ENUMERATIONS[name](int(value)) if name in _ENUMERATIONS else value
+    return ENUMERATIONS[name](int(value)) if name in ENUMERATIONS else value
