@@ -12,7 +12,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import NS, BeadsTruth
-from nanorocks_ros.wire.array_layouts import (
+from nanorocks_ros.wire.layout_fields import (
     LayoutField,
     array_elements,
     exact_values,

@@ -14,8 +14,9 @@ from nanorocks_ros import settings as st
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import FLAGS
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import array_elements, layout
+from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
+from nanorocks_ros.wire.layout_fields import array_elements
 from nanorocks_ros.wire.products import PRODUCTS
 
 if TYPE_CHECKING:

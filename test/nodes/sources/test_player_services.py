@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip('rclpy')
-srv = pytest.importorskip('rosbag2_interfaces.srv', reason='needs rosbag2_interfaces')
+pytest.importorskip('rosbag2_interfaces', reason='needs rosbag2_interfaces')
 
 from nanorocks_ros.nodes.base.ros_messages import time_message
+from nanorocks_ros.nodes.sources.player_services import rosbag2_services
 from nanorocks_ros.recordings.bag.reader import open_bag
 
 SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
@@ -17,7 +18,7 @@ SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
 
 def test_the_services_are_those_of_ros2_bag_play(graph):
     def call(name, **fields):
-        kind = getattr(srv, name.title().replace('_', ''))
+        kind = getattr(rosbag2_services(), name.title().replace('_', ''))
         client = graph.node.create_client(kind, f'/nanorocks/bag_player/{name}')
         graph.until(client.service_is_ready)
         future = client.call_async(kind.Request(**fields))
