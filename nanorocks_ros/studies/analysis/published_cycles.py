@@ -1,6 +1,6 @@
 """What `nanorocks analyse` published of cycles: figures show it first.
 
-Tested by ``test/studies/analysis/test_published_cycles.py``.
+Tested by ``test/cli/figures/test_published_first.py``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Interval
 
-_LETTERS = 100
+_LETTERS = 112
 _ALONE = ('joint', 'decay', 'contact')
 _NAMES = {'joint': 'both together', 'decay': 'decay alone', 'contact': 'contacts alone'}
 _SHOWN_BY = {Headline.JOINT: 'joint', Headline.DECAY: 'decay', Headline.CONTACTS: 'contact'}

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros import __version__
-from nanorocks_ros.errors import RecordingError, UnwritableError
+from nanorocks_ros.errors import ConfigurationError, RecordingError, UnwritableError
 from nanorocks_ros.experiment.recorded_experiment import experiment_key, metadata_of_settings
+from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.parquet import Column, write_parquet
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
@@ -32,6 +33,7 @@ from nanorocks_ros.wire.products import MEASURED
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis
@@ -74,6 +76,39 @@ def trays_file_of(folder: Path) -> str:
         return read_metadata(folder / BAG_NAME).get(experiment_key('trays_file'), '')
     except RecordingError:
         return ''
+
+
+def trays_of_results(folder: Path, told: str = '') -> dict[int, Tray]:
+    """The trays of some results, which no other may replace.
+
+    Parameters
+    ----------
+    folder : Path
+        Results, or any folder with tables.
+    told : str
+        A trays file that the user names, if any.
+
+    Raises
+    ------
+    ConfigurationError
+        When `told` describes a tray otherwise than the results.
+    """
+    try:
+        metadata = read_metadata(folder / BAG_NAME)
+    except RecordingError:
+        # Tables of somebody else carry no tray.
+        return load_trays(told)
+    carried = load_trays(metadata.get(experiment_key('trays_file'), ''))
+    analysed = {int(word) for word in metadata.get(experiment_key('trays'), '').split()}
+    other = load_trays(told) if told else carried
+    differ = [number for number in sorted(analysed) if other.get(number) != carried.get(number)]
+    if differ:
+        raise ConfigurationError(
+            told,
+            f'describes tray {", ".join(map(str, differ))} otherwise than {folder}',
+            'leave it out, or analyse the recording again with it',
+        )
+    return carried
 
 
 def write_results(
