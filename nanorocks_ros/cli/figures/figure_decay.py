@@ -59,8 +59,8 @@ def run(options: argparse.Namespace) -> int:
     """Read, draw and print, and return the exit code."""
     from nanorocks_ros.experiment.trays import tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.studies.analysis.results_folder import trays_of_results
     from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
+    from nanorocks_ros.studies.results.results_provenance import trays_of_results
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)

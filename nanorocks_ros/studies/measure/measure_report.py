@@ -89,6 +89,8 @@ def _plain(value: RestitutionOfContacts, scale: float) -> dict[str, Any]:
         'restitution_error': interval.error,
         'restitution_lower': interval.lower,
         'restitution_upper': interval.upper,
+        'restitution_lower_68': value.lower_68,
+        'restitution_upper_68': value.upper_68,
         'speed': scale * value.speed,
     }
 
