@@ -62,9 +62,7 @@ def figure_file(
         yield figure
         told = command or command_line() or program_name()
         with atomic_file(path) as part:
-            figure.savefig(
-                part, metadata=_metadata(path.suffix, command or command_line() or program_name())
-            )
+            figure.savefig(part, metadata=_metadata(path.suffix, told))
 
 
 def check_picture(path: Path, flag: str = 'figure') -> None:

@@ -173,6 +173,11 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
 
 def _data(options: argparse.Namespace, source: Path) -> CorData:
     from nanorocks_ros.experiment.trays import tray_by_number
+    from nanorocks_ros.studies.analysis.published_cycles import (
+        published_cycles,
+        published_lines,
+        truth_of,
+    )
     from nanorocks_ros.studies.decays.cooling_curves import (
         read_cycles,
         species_cycles,
@@ -200,6 +205,9 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
         span=span_of(options.first, options.last, default_span),
         start=window.start if window else 0.0,
         wall_restitution=options.wall_restitution,
+        published=tuple(
+            published_lines(published_cycles(table, number), truth_of(table.parent, number))
+        ),
     )
 
 
