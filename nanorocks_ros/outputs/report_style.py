@@ -36,6 +36,6 @@ td.n { font-variant-numeric: tabular-nums; white-space: nowrap; }
   figure.picture, tr { break-inside: avoid; } figure img { max-height: 230mm; padding: 0; }
   thead { display: table-header-group; } .scroll { overflow: visible; }
   table { font-size: 7.5pt; width: 100%; overflow-wrap: anywhere; }
-  th, td { padding: 1pt 3pt; } td.n { white-space: normal; }
+  th, td { padding: 1pt 3pt; } th { overflow-wrap: break-word; } td.n { white-space: normal; }
 }
 """
