@@ -8,13 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from nanorocks_ros.outputs.atomic_files import atomic_file
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from nanorocks_ros.records import PairCollision
     from nanorocks_ros.studies.measure.measured_words import LengthUnit
     from nanorocks_ros.studies.measure.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
@@ -31,7 +27,7 @@ if TYPE_CHECKING:
 def measure_figure(
     path: Path, speeds: TrackSpeeds, contacts: TrackContacts, unit: LengthUnit
 ) -> None:
-    """Draw the speeds, and both kinds of contacts.
+    """Draw the speeds, and both kinds of contacts, into a file.
 
     Parameters
     ----------
@@ -46,28 +42,26 @@ def measure_figure(
     RecordingError
         When the picture cannot be written.
     """
+    with atomic_file(path) as part:
+        drawn_measure(speeds, contacts, unit).savefig(part, dpi=110)
+
+
+def drawn_measure(speeds: TrackSpeeds, contacts: TrackContacts, unit: LengthUnit) -> Figure:
+    """The figure of the speeds and both kinds of contacts."""
     figure = Figure(figsize=(12.0, 3.9), layout='constrained')
     time, pairs, walls = figure.subplots(1, 3)
     time.plot(speeds.time, unit.per_metre * speeds.mean, label='mean')
     time.plot(speeds.time, unit.per_metre * speeds.rms, lw=0.8, label='rms')
     time.set(xlabel='time [s]', ylabel=f'speed of the beads [{unit.name}/s]', ylim=(0.0, None))
     time.legend(frameon=False)
-    collided = np.array([_normal_speeds(pair) for pair in contacts.collisions]).reshape(-1, 2)
+    collided = np.array([pair.normal_speeds for pair in contacts.collisions]).reshape(-1, 2)
     rebounded = np.array(
         [(rebound.incoming.value, rebound.outgoing.value) for rebound in contacts.rebounds]
     ).reshape(-1, 2)
     alone = contacts.alone
     _scatter(pairs, collided, alone.beads.restitution.value, 'collisions of two beads', unit)
     _scatter(walls, rebounded, alone.walls.restitution.value, 'rebounds from walls', unit)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
-
-
-def _normal_speeds(pair: PairCollision) -> tuple[float, float]:
-    """Speeds of approach and of parting along the projected line of centres, [m/s]."""
-    normal = pair.separation / np.hypot(*pair.separation)
-    before, after = pair.before[1] - pair.before[0], pair.after[1] - pair.after[0]
-    return -float(before @ normal), float(after @ normal)
+    return figure
 
 
 def _scatter(

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-
-from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.studies.synthetic.simulated_plan import shown_times
-
-mpl.use('Agg')
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
+
+from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.studies.synthetic.simulated_plan import shown_times
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,6 +52,12 @@ def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
     ----------
     Lower panel after [B19] fig. 11.
     """
+    with atomic_file(path) as part:
+        drawn_runs(simulated).savefig(part, dpi=110)
+
+
+def drawn_runs(simulated: SimulatedRuns) -> Figure:
+    """The figure of simulated runs, as `simulated_figure` writes it."""
     shown_indices = shown_times(simulated.plan.samples)
     length, width, _ = simulated.plan.tray.dimensions
     columns = min(len(shown_indices), 2 if length > _LONG_ASPECT * width else len(shown_indices))
@@ -65,8 +68,7 @@ def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
     trays = panels[0].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     _draw_trays(trays, simulated, shown_indices)
     _draw_decay(panels[1].subplots(), simulated, shown_indices)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    return figure
 
 
 def _draw_trays(
