@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.interface.analysis_result import AnalysisResult as AnalysisResult
     from nanorocks_ros.interface.measure_result import MeasureResult as MeasureResult
     from nanorocks_ros.interface.measuring import measure as measure
+    from nanorocks_ros.interface.reading import read as read
     from nanorocks_ros.interface.simulating import simulate as simulate
     from nanorocks_ros.interface.simulation_result import SimulationResult as SimulationResult
     from nanorocks_ros.interface.tracking import TrackResult as TrackResult
@@ -49,6 +50,7 @@ __all__ = [
     '__version__',
     'analyse',
     'measure',
+    'read',
     'simulate',
     'track',
 ]
@@ -66,6 +68,7 @@ _MODULES = {
     'TrackResult': 'interface.tracking',
     'analyse': 'interface.analysis',
     'measure': 'interface.measuring',
+    'read': 'interface.reading',
     'simulate': 'interface.simulating',
     'track': 'interface.tracking',
 }

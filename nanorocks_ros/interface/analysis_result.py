@@ -1,4 +1,7 @@
-"""The result of `analyse`: speeds, contacts, clusters and restitutions of many cycles."""
+"""The result of `analyse`: speeds, contacts, clusters and restitutions of many cycles.
+
+Tested by ``test/interface/test_analysis.py``.
+"""
 
 from __future__ import annotations
 
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
+    from nanorocks_ros.records import PairCollision, Rebound
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
@@ -162,7 +166,7 @@ class AnalysisResult(Result):
             for recording in self._recordings
             for tray in recording.analysis.trays
         ]
-        return joined(frames, {'probability': self._probability})
+        return joined(frames, probability=self._probability)
 
     @property
     def _probability(self) -> float:
@@ -178,7 +182,7 @@ class AnalysisResult(Result):
     def _contacts(self) -> pd.DataFrame:
         def contacts(recording: AnalysedRecording, tray: int) -> pd.DataFrame:
             results = recording.analysis.trays[tray]
-            own = [*results.rebounds, *results.collisions]
+            own: list[Rebound | PairCollision] = [*results.rebounds, *results.collisions]
             return contact_frame(own, recording.analysis.epoch_ns)
 
         return self._joined(contacts)
@@ -268,7 +272,7 @@ def _cycle_rows(
     cycles = last_of_each_cycle(results.cors)
     used = used_speeds(results.speeds, cycles, wall_prior(recording.analysis.prior))
     ends = ends_of_cycles(results.clusters)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for cor in cycles:
         words = cycle_as_json(cor, end_of_cycle(ends, cor), used[cor.cycle])
         reason = words['reason']

@@ -1,4 +1,7 @@
-"""The figure of an analysis: speeds of all cycles, and the restitution of each."""
+"""The figure of an analysis: speeds of all cycles, and the restitution of each.
+
+Tested by ``test/interface/test_analysis.py``.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,9 +64,8 @@ def _draw_cycles(axes: Axes, cor: pd.DataFrame, together: pd.DataFrame) -> None:
     places = np.arange(1, len(known) + 1)
     if len(together) and np.isfinite(float(together['restitution'].iloc[0] or np.nan)):
         row = together.iloc[0]
-        axes.axhspan(
-            row['restitution_lower'], row['restitution_upper'], color=_TOGETHER, alpha=0.2
-        )
+        ends = row['restitution_lower'], row['restitution_upper']
+        axes.axhspan(*ends, color=_TOGETHER, alpha=0.2)
         axes.axhline(row['restitution'], color=_TOGETHER, lw=1.5, label='all cycles together')
         axes.legend(frameon=False, fontsize=9)
     for suffix, width in (('', 1.0), ('_68', 3.0)):
@@ -75,6 +78,6 @@ def _draw_cycles(axes: Axes, cor: pd.DataFrame, together: pd.DataFrame) -> None:
         )
     axes.plot(places, known['restitution'], 'o', ms=5, color=_BEADS)
     axes.set_ylabel('restitution of beads')
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0.5, max(len(known), 1) + 0.5)
     axes.grid(alpha=0.25)

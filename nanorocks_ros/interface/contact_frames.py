@@ -1,4 +1,7 @@
-"""Contacts of beads as one DataFrame: collisions of two beads and rebounds from walls."""
+"""Contacts of beads as one DataFrame: collisions of two beads and rebounds from walls.
+
+Tested by ``test/interface/test_measuring.py``.
+"""
 
 from __future__ import annotations
 

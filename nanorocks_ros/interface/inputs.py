@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -19,7 +20,6 @@ from nanorocks_ros.studies.film_import.film_cache import cached_import, is_film
 from nanorocks_ros.studies.measure.told_film import described_film
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterable, Mapping, Sequence
 
     PathLike = str | os.PathLike[str]
@@ -62,14 +62,14 @@ class FilmDescription(TypedDict, total=False):
 class ToldByKeywords:
     """A description as the studies want it: lists for species, None where nothing is told."""
 
-    diameter_px: list[float] | None = None
-    diameter_mm: list[float] | None = None
-    count: list[int] | None = None
-    look: list[str] | None = None
-    colour: list[str] | None = None
-    density_g_cm3: list[float] | None = None
-    corners: list[float] | None = None
-    sides_mm: list[float] | None = None
+    diameter_px: Sequence[float] | None = None
+    diameter_mm: Sequence[float] | None = None
+    count: Sequence[int] | None = None
+    look: Sequence[str] | None = None
+    colour: Sequence[str] | None = None
+    density_g_cm3: Sequence[float] | None = None
+    corners: Sequence[float] | None = None
+    sides_mm: Sequence[float] | None = None
     height_mm: float | None = None
 
 
@@ -117,8 +117,7 @@ def named_paths(recordings: PathLike | Iterable[PathLike]) -> list[Path]:
     RecordingError
         When nothing is named, or a pattern matches nothing.
     """
-    is_single = isinstance(recordings, str) or hasattr(recordings, '__fspath__')
-    texts: list[Any] = [recordings] if is_single else [*recordings]  # type: ignore[list-item]
+    texts = [recordings] if isinstance(recordings, str | os.PathLike) else [*recordings]
     paths = [path for text in texts for path in _expanded(str(Path(text).expanduser()))]
     if not paths:
         raise RecordingError('recordings', 'none is named', 'name a bag, a video, or many')
@@ -213,7 +212,7 @@ def _told_film(values: Mapping[str, Any]) -> ToldByKeywords:
                 name, f'is no keyword{meant}', f'choose from {", ".join(known)}'
             )
     single = 'height_mm', 'corners', 'sides_mm'
-    lists = {
+    lists: dict[str, Any] = {
         name: value if name in single or value is None else _as_list(value)
         for name, value in values.items()
     }

@@ -1,12 +1,17 @@
-"""The result of `measure`: what a film of any beads says."""
+"""The result of `measure`: what a film of any beads says.
+
+Tested by ``test/interface/test_measuring.py``.
+"""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from nanorocks_ros.interface.contact_frames import contact_frame
+from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import in_px, joined, table_frame, with_column
 from nanorocks_ros.interface.result import Result, Summary
 from nanorocks_ros.outputs.html_report import with_interval
@@ -20,9 +25,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
+    from nanorocks_ros.interface.analysis_result import AnalysisResult
     from nanorocks_ros.studies.measure.measure_film import Measured, MeasurePlan
     from nanorocks_ros.studies.measure.measure_report import MeasuredTray
 
+# What a line says of a restitution that is not known.
+_UNKNOWN = re.compile('no restitution|not determined')
 _SPEED_UNITS = {'time': 's', 'mean_speed': 'm/s', 'rms_speed': 'm/s', 'beads': '1'}
 
 
@@ -70,6 +78,15 @@ class MeasureResult(Result):
         """
         return self.table('cor')
 
+    @property
+    def decay(self) -> AnalysisResult | None:
+        """Cycles, by the decay of the speeds and contacts together; None where not read."""
+        if not any(tray.decay_read for tray in self._measured.trays):
+            return None
+        from nanorocks_ros.interface.reading import read
+
+        return read(self.folder)
+
     def _makers(self) -> dict[str, Callable[[], pd.DataFrame]]:
         return {
             'speeds': lambda: self._joined(_speeds),
@@ -85,7 +102,7 @@ class MeasureResult(Result):
             if tray.unit.name == 'px':
                 frame = in_px(frame, tray.unit.per_metre)
             frames.append(frame)
-        return joined(frames, {'probability': self._probability})
+        return joined(frames, probability=self._probability)
 
     def _contacts(self, tray: MeasuredTray) -> pd.DataFrame:
         return contact_frame(tray.contacts.contacts, self._measured.tracked.epoch_ns)
@@ -107,13 +124,14 @@ class MeasureResult(Result):
                 (f'{tray.number}', name, _interval(value), f'{value.contacts}')
                 for name, value in _restitutions(tray).items()
             ]
-            lines += [*tray.recognition, *tray.lines[:2], *tray.decay]
+            unknown = [line for line in tray.lines[2:] if _UNKNOWN.search(line)]
+            lines += [*tray.recognition, *tray.lines[:2], *unknown, *tray.decay]
         verdict = '' if self.usable else ': NOT USABLE'
         return Summary(
             title=f'{self.provenance["film"]}{verdict}; report in {self.folder / "report.html"}',
             head=('tray', 'contacts of beads with', 'COR', 'contacts'),
             rows=tuple(rows),
-            lines=(*lines, *self.notices),
+            lines=(*map(python_words, lines), *self.notices),
         )
 
 

@@ -51,4 +51,6 @@ def in_python() -> Iterator[None]:
         yield
     except NanorocksError as error:
         words = [python_words(part) for part in (error.where, error.what, error.do)]
+        if words == [error.where, error.what, error.do]:
+            raise
         raise type(error)(*words) from error

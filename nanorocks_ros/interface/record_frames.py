@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from nanorocks_ros.records import NS, Quality
-from nanorocks_ros.wire.array_layouts import layout
-from nanorocks_ros.wire.flat_records import flat_value
+from nanorocks_ros.studies.results.record_columns import columns_of, record_arrays
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -21,13 +18,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.outputs.parquet import Column
     from nanorocks_ros.records import ArrayRecord
 
-# Fields of the layout that a record keeps as an integer stamp.
-_STAMPS = {
-    'time': 'stamp_ns',
-    'cycle_start': 'cycle_start_ns',
-    'known': 'known_ns',
-    'first_merge': 'first_merge_ns',
-}
 # Metres at the start of a unit, with a power.
 _METRES = re.compile(r'^m(?:\^(\d))?(?=$|/)')
 
@@ -50,37 +40,24 @@ def frame_of(
     DataFrame
         With ``attrs['units']``, a unit by column.
     """
-    fields = layout(kind).fields
-    columns: dict[str, Any] = {'tray': [record.tray for record in records]}
-    for field in fields:
-        name = _STAMPS.get(field.name, field.name)
-        values = [flat_value(record, name) for record in records]
-        columns[field.name] = _times(values, epoch_ns) if field.name in _STAMPS else _words(values)
+    columns: dict[str, NDArray[Any]] = {
+        'tray': np.array([record.tray for record in records], dtype=np.int64),
+        **record_arrays(kind, records, epoch_ns),
+    }
     frame = pd.DataFrame(columns)
-    frame.attrs['units'] = {'tray': '1', **{field.name: field.unit for field in fields}}
+    units = {column.name: column.unit for column in columns_of(kind)}
+    frame.attrs['units'] = {'tray': '1', **units}
     return frame
 
 
-def _times(values: Sequence[int | None], epoch_ns: int) -> list[float]:
-    return [np.nan if value is None else (value - epoch_ns) / NS for value in values]
-
-
-def _words(values: list[Any]) -> list[Any]:
-    if values and isinstance(values[0], Quality):
-        return [', '.join(value.names()).replace('_', ' ') for value in values]
-    if values and isinstance(values[0], IntEnum):
-        return [value.name.lower().replace('_', ' ') for value in values]
-    return values
-
-
-def joined(frames: Iterable[pd.DataFrame], attributes: Mapping[str, Any]) -> pd.DataFrame:
+def joined(frames: Iterable[pd.DataFrame], **attributes: Any) -> pd.DataFrame:
     """Frames of the same columns below each other, with units and further attributes.
 
     Parameters
     ----------
     frames : iterable of DataFrame
         At least one.
-    attributes : mapping
+    **attributes
         Added to ``attrs``.
     """
     parts = list(frames)
@@ -90,7 +67,8 @@ def joined(frames: Iterable[pd.DataFrame], attributes: Mapping[str, Any]) -> pd.
         # pandas compares them, which takes long.
         part.attrs = {}
     whole = pd.concat(filled, ignore_index=True)
-    whole.attrs = {'units': dict(units), **attributes}
+    whole.attrs['units'] = dict(units)
+    whole.attrs.update(attributes)
     return whole
 
 

@@ -1,4 +1,7 @@
-"""What all results have in common: tables, words, a summary for terminal and notebook."""
+"""What all results have in common: tables, words, a summary for terminal and notebook.
+
+Tested by ``test/interface/test_analysis.py``.
+"""
 
 from __future__ import annotations
 
@@ -145,11 +148,12 @@ class Result:
 def _show_in_notebook(figure_type: type) -> None:
     """Let a notebook draw figures, which it learns only with pyplot."""
     module = sys.modules.get('IPython')
-    shell = None if module is None else module.get_ipython()
+    shell: Any = None if module is None else module.get_ipython()
     if not hasattr(shell, 'kernel'):
         return
     formatter = shell.display_formatter.formatters['image/png']
     if figure_type not in formatter.type_printers:
-        from IPython.core.pylabtools import select_figure_formats
+        from IPython.core import pylabtools
 
-        select_figure_formats(shell, {'png'})
+        register: Any = pylabtools.select_figure_formats
+        register(shell, {'png'})

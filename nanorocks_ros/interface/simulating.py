@@ -83,7 +83,7 @@ def simulate(
     """
     with in_python():
         told = with_values(SimulationSettings(), {'tray': tray, **settings}, 'simulate')
-        trays = load_trays(trays_file or None)
+        trays = load_trays(str(trays_file))
         samples = default_samples(told, duration) if times is None else times
         plan = SimulationPlan(
             settings=told,

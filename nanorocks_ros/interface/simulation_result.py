@@ -1,4 +1,7 @@
-"""The result of `simulate`: runs of a tray, and the truth behind a film of the first."""
+"""The result of `simulate`: runs of a tray, and the truth behind a film of the first.
+
+Tested by ``test/interface/test_simulating.py``.
+"""
 
 from __future__ import annotations
 

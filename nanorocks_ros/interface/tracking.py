@@ -1,4 +1,7 @@
-"""Track the beads of a film: `nanorocks_ros.track`."""
+"""Track the beads of a film: `nanorocks_ros.track`.
+
+Tested by ``test/interface/test_measuring.py``.
+"""
 
 from __future__ import annotations
 
