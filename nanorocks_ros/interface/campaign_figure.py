@@ -8,16 +8,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TWO_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MM = 1e3
-_CYCLE, _BEADS, _TOGETHER = '#30506f', '#30506f', '#c23b22'
-_HEIGHT, _WIDTH = 3.2, 11.0
+# Height of a row, [mm].
+_HEIGHT = 55.0
 
 
 def campaign_figure(speeds: pd.DataFrame, cor: pd.DataFrame, combined: pd.DataFrame) -> Figure:
@@ -32,15 +35,15 @@ def campaign_figure(speeds: pd.DataFrame, cor: pd.DataFrame, combined: pd.DataFr
         As of `AnalysisResult`.
     """
     trays = sorted(set(speeds['tray']) | set(cor['tray'])) or [0]
-    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(trays)), layout='constrained')
-    rows = figure.subplots(len(trays), 2, squeeze=False, width_ratios=(3, 2))
-    for (decay, restitution), tray in zip(rows, trays, strict=True):
-        _draw_speeds(decay, speeds[(speeds['tray'] == tray) & (speeds['cycle'] > 0)])
-        own = combined[combined['tray'] == tray]
-        _draw_cycles(restitution, cor[cor['tray'] == tray], own)
-        decay.set_title(f'tray {tray}', loc='left', fontsize=10)
-    rows[-1, 0].set_xlabel('time since the shaking event [s]')
-    rows[-1, 1].set_xlabel('cycle')
+    with figure_file(None, TWO_COLUMNS, _HEIGHT * len(trays)) as figure:
+        rows = figure.subplots(len(trays), 2, squeeze=False, width_ratios=(3, 2))
+        for (decay, restitution), tray in zip(rows, trays, strict=True):
+            _draw_speeds(decay, speeds[(speeds['tray'] == tray) & (speeds['cycle'] > 0)])
+            own = combined[combined['tray'] == tray]
+            _draw_cycles(restitution, cor[cor['tray'] == tray], own)
+            decay.set_title(f'tray {tray}')
+        rows[-1, 0].set_xlabel('time since the shaking event [s]')
+        rows[-1, 1].set_xlabel('cycle')
     return figure
 
 
@@ -50,13 +53,13 @@ def _draw_speeds(axes: Axes, speeds: pd.DataFrame) -> None:
         axes.plot(
             own['time'] - own['cycle_start'],
             _MM * own['mean_projected_speed'],
-            color=_CYCLE,
-            lw=0.8,
+            color=MEASURED,
+            lw=0.7,
             alpha=max(0.15, min(0.9, 4.0 / len(cycles))),
         )
     axes.set_ylabel('mean projected speed [mm/s]')
     axes.set_ylim(0.0, None)
-    axes.grid(alpha=0.25)
+    axes.grid(visible=True)
 
 
 def _draw_cycles(axes: Axes, cor: pd.DataFrame, together: pd.DataFrame) -> None:
@@ -65,19 +68,19 @@ def _draw_cycles(axes: Axes, cor: pd.DataFrame, together: pd.DataFrame) -> None:
     if len(together) and np.isfinite(float(together['restitution'].iloc[0] or np.nan)):
         row = together.iloc[0]
         ends = row['restitution_lower'], row['restitution_upper']
-        axes.axhspan(*ends, color=_TOGETHER, alpha=0.2)
-        axes.axhline(row['restitution'], color=_TOGETHER, lw=1.5, label='all cycles together')
-        axes.legend(frameon=False, fontsize=9)
+        axes.axhspan(*ends, color=FITTED, alpha=0.2)
+        axes.axhline(row['restitution'], color=FITTED, lw=1.5, label='all cycles together')
+        axes.legend()
     for suffix, width in (('', 1.0), ('_68', 3.0)):
         axes.vlines(
             places,
             known[f'restitution_lower{suffix}'],
             known[f'restitution_upper{suffix}'],
-            color=_BEADS,
+            color=MEASURED,
             lw=width,
         )
-    axes.plot(places, known['restitution'], 'o', ms=5, color=_BEADS)
+    axes.plot(places, known['restitution'], 'o', color=MEASURED)
     axes.set_ylabel('restitution of beads')
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0.5, max(len(known), 1) + 0.5)
-    axes.grid(alpha=0.25)
+    axes.grid(visible=True)

@@ -112,10 +112,10 @@ class MeasureResult(Result):
         return table_frame(columns_of(tracked), track_pieces(tracked))
 
     def _figure(self) -> Figure:
-        from nanorocks_ros.studies.measure.measure_figure import drawn_measure
+        from nanorocks_ros.studies.measure.measure_figure import measure_figure
 
         tray = self._measured.trays[0]
-        return drawn_measure(tray.speeds, tray.contacts, tray.unit)
+        return measure_figure(None, tray.speeds, tray.contacts, tray.unit)
 
     def _summary(self) -> Summary:
         rows, lines = [], []

@@ -120,9 +120,9 @@ class SimulationResult(Result):
         return frame
 
     def _figure(self) -> Figure:
-        from nanorocks_ros.studies.synthetic.simulated_figure import drawn_runs
+        from nanorocks_ros.studies.synthetic.simulated_figure import simulated_figure
 
-        return drawn_runs(self._simulated)
+        return simulated_figure(None, self._simulated)
 
     def _summary(self) -> Summary:
         runs, plan = self._simulated, self._simulated.plan

@@ -14,6 +14,8 @@ from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.interface.record_frames import table_frame
 from nanorocks_ros.interface.result import Result, Summary
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import TWO_COLUMNS
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import columns_of, track_pieces
 from nanorocks_ros.studies.inspection.track_overlay import overlay
@@ -27,7 +29,8 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.interface.inputs import FilmDescription, PathLike
 
-_WIDTH, _MARGIN = 7.0, 0.4
+# Height of a title, [mm].
+_TITLE = 10.0
 
 
 def track(
@@ -121,19 +124,17 @@ def _tracks_in(records: Sequence[Any]) -> int:
 
 def tracks_figure(tracked: TrackedBag) -> Figure:
     """The last picture of each tray with the beads and their paths."""
-    from matplotlib.figure import Figure
-
     pictures = {
         number: overlay(image, tracked.tracks[number], tracked.pixels_per_metre)
         for number, image in sorted(tracked.pictures.items())
     }
     heights = [
-        _MARGIN + _WIDTH * picture.shape[0] / picture.shape[1] for picture in pictures.values()
+        _TITLE + TWO_COLUMNS * picture.shape[0] / picture.shape[1] for picture in pictures.values()
     ]
-    figure = Figure(figsize=(_WIDTH, sum(heights)), layout='constrained')
-    panels = figure.subplots(len(pictures), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for axes, (number, picture) in zip(panels, pictures.items(), strict=True):
-        axes.imshow(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
-        axes.set_title(f'tray {number}: beads, and their paths of one second', loc='left')
-        axes.set_axis_off()
+    with figure_file(None, TWO_COLUMNS, sum(heights)) as figure:
+        rows = figure.subplots(len(pictures), 1, squeeze=False, height_ratios=heights)
+        for axes, (number, picture) in zip(rows[:, 0], pictures.items(), strict=True):
+            axes.imshow(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+            axes.set_title(f'tray {number}: beads, and their paths of one second')
+            axes.set_axis_off()
     return figure

@@ -12,8 +12,8 @@ import nanorocks_ros
 
 _HEAD = """# The public Python interface
 
-Made by `make docs` from `nanorocks_ros.__all__`; [python](../use/python.md) shows its use. These names are stable: a change
-is announced one release before, and the old name works until then.
+Made by `make docs` from `nanorocks_ros.__all__`; [python](../use/python.md) shows its use. These
+names are stable: a change is announced one release before, and the old name works until then.
 
 """
 
@@ -39,10 +39,14 @@ def python_page() -> str:
             text += f'## {name}\n\n{_sentence(value)}\n\n'
             text += _table(('attribute', 'meaning'), _attributes(value))
     text += '## Exceptions\n\nEach says `.where`, `.what` and what to `.do`.\n\n'
-    return text + _table(
-        ('exception', 'meaning'),
-        [(f'`{name}`', _sentence(value)) for name, value in errors.items()],
-    ).rstrip('\n') + '\n'
+    return (
+        text
+        + _table(
+            ('exception', 'meaning'),
+            [(f'`{name}`', _sentence(value)) for name, value in errors.items()],
+        ).rstrip('\n')
+        + '\n'
+    )
 
 
 def _sentence(value: Any) -> str:
