@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.errors import SimulationError as SimulationError
     from nanorocks_ros.interface.analysis import analyse as analyse
     from nanorocks_ros.interface.analysis_result import AnalysisResult as AnalysisResult
+    from nanorocks_ros.interface.inputs import FilmDescription as FilmDescription
     from nanorocks_ros.interface.measure_result import MeasureResult as MeasureResult
     from nanorocks_ros.interface.measuring import measure as measure
     from nanorocks_ros.interface.reading import read as read
@@ -39,6 +40,7 @@ __version__ = '0.1.0'
 __all__ = [
     'AnalysisResult',
     'ConfigurationError',
+    'FilmDescription',
     'FitError',
     'FrameError',
     'MeasureResult',
@@ -58,6 +60,7 @@ __all__ = [
 _MODULES = {
     'AnalysisResult': 'interface.analysis_result',
     'ConfigurationError': 'errors',
+    'FilmDescription': 'interface.inputs',
     'FitError': 'errors',
     'FrameError': 'errors',
     'MeasureResult': 'interface.measure_result',

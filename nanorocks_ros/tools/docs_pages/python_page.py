@@ -35,7 +35,10 @@ def python_page() -> str:
         text += f'## {name}\n\n```text\n{_call(name, value)}\n```\n\n'
         text += _table(('keyword', 'meaning'), _parameters(value))
     for name, value in classes.items():
-        if name not in errors:
+        if issubclass(value, dict):
+            text += f'## {name}\n\n{_sentence(value)}\n\n'
+            text += _table(('keyword', 'meaning'), _parameters(value))
+        elif name not in errors:
             text += f'## {name}\n\n{_sentence(value)}\n\n'
             text += _table(('attribute', 'meaning'), _attributes(value))
     text += '## Exceptions\n\nEach says `.where`, `.what` and what to `.do`.\n\n'
