@@ -350,7 +350,7 @@ def test_pictures_are_not_asked_for_by_a_page_that_is_gone(look, full):
 
 def test_a_lost_connection_is_said_and_found_again(look, full, serve, results):
     page = look(full.url)
-    text_is(page, '#link', 'live')
+    text_is(page, '#cor', shown(results.cors[-1])[0])
     port = full.port
     full.stop()
     text_is(page, '#link', 'connection lost, trying again')
@@ -378,12 +378,12 @@ def test_the_token_is_asked_for_and_kept(look, serve, results):
     page.keyboard.press('Enter')
     text_is(page, '#cor', shown(results.cors[-1])[0])
     page.reload()
-    text_is(page, '#link', 'live')
+    text_is(page, '#cor', shown(results.cors[-1])[0])
     assert page.evaluate('document.cookie') == ''
 
 
 def test_the_token_does_not_stay_in_the_address(look, serve):
     server = serve(token=TOKEN)
     page = look(server.url)
-    text_is(page, '#link', 'live')
+    text_is(page, '#link', 'waiting for the pipeline')
     assert TOKEN not in page.url
