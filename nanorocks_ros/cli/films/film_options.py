@@ -27,6 +27,7 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--look', nargs='+', metavar='LOOK', help='dark, bright or auto (default), on the floor'
     )
+    group.add_argument('--material', nargs='+', metavar='NAME', help='its name; default: beads')
     group.add_argument(
         '--colour', nargs='+', metavar='COLOUR', help='name, "#rrggbb" or auto (default)'
     )
@@ -125,6 +126,7 @@ def _beads(options: argparse.Namespace, k: int) -> FilmedBeads:
         density=value(options.density_g_cm3),
         look=value(options.look) or AUTO,
         colour=value(options.colour) or AUTO,
+        material=value(options.material) or '',
     )
 
 
@@ -135,7 +137,11 @@ def _check(options: argparse.Namespace) -> None:
         '--count': options.count,
         '--density-g-cm3': options.density_g_cm3,
     }
-    words = {'--look': options.look, '--colour': options.colour}
+    words = {
+        '--look': options.look,
+        '--colour': options.colour,
+        '--material': options.material,
+    }
     single = [] if options.height_mm is None else [options.height_mm]
     positive = {**lists, '--sides-mm': options.sides_mm, '--height-mm': single}
     for flag, values in positive.items():
