@@ -38,6 +38,8 @@ class FilmDescription(TypedDict, total=False):
         On the floor.
     colour : str
         Name, ``#rrggbb`` or ``auto``.
+    material : str
+        Its name; "beads" where it is not told.
     density_g_cm3 : float, [g/cm^3]
     corners : sequence of float, [px]
         Column and row of two opposite corners of the container, or of all four.
@@ -52,6 +54,7 @@ class FilmDescription(TypedDict, total=False):
     count: int | Sequence[int]
     look: str | Sequence[str]
     colour: str | Sequence[str]
+    material: str | Sequence[str]
     density_g_cm3: float | Sequence[float]
     corners: Sequence[float]
     sides_mm: tuple[float, float]
@@ -67,6 +70,7 @@ class ToldByKeywords:
     count: Sequence[int] | None = None
     look: Sequence[str] | None = None
     colour: Sequence[str] | None = None
+    material: Sequence[str] | None = None
     density_g_cm3: Sequence[float] | None = None
     corners: Sequence[float] | None = None
     sides_mm: Sequence[float] | None = None

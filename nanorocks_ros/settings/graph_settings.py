@@ -132,6 +132,9 @@ class DashboardSettings:
     picture_rate: float = setting(
         8.0, 'largest rate of images of a tray per browser', '1/s', low=0.1, high=30.0
     )
+    kept_cycles: int = setting(
+        20, 'finished cycles of each tray that can be opened again', low=0, high=200
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

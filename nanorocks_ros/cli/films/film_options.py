@@ -20,6 +20,7 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--look', nargs='+', metavar='LOOK', help='dark, bright or auto (default), on the floor'
     )
+    group.add_argument('--material', nargs='+', metavar='NAME', help='its name; default: beads')
     group.add_argument(
         '--colour', nargs='+', metavar='COLOUR', help='name, "#rrggbb" or auto (default)'
     )
