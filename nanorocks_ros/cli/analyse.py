@@ -35,8 +35,6 @@ Examples:
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    import argparse
-
     from nanorocks_ros.cli.analyse_batch import add_options
     from nanorocks_ros.cli.flags import add_bag
 
@@ -44,7 +42,6 @@ def add_parser(commands: Any) -> None:
         'analyse',
         help='analyse one bag or many offline',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_bag(parser, many=True)
     parser.add_argument(
@@ -67,6 +64,7 @@ def add_parser(commands: Any) -> None:
         help='count decays that contacts contradict, too, in the means of all cycles',
     )
     add_options(parser)
+    parser.leave_out('--no-output', '--include-inconsistent', '--scheduler')
     parser.set_defaults(run=run)
 
 

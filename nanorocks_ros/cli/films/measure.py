@@ -26,7 +26,7 @@ _EPILOG = """\
 Examples:
 
   nanorocks measure film.mp4 --diameter-px 31 -o out
-  nanorocks measure film.mp4 --tray mine.yaml -o out
+  nanorocks measure film.mp4 --trays-file mine.yaml -o out
 
 The second knows the container (`nanorocks tray` writes the file), so that the decay of the speeds
 is read as well. The same command continues after an interruption, and takes finished steps from
@@ -36,20 +36,20 @@ the folder. Exit code 3: done, but the beads are not recognised well enough.
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.films.film_options import add_film_options
+    from nanorocks_ros.cli.films.film_options import add_film_options, leave_out_film_options
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
         'measure',
         help='measure a film: tracks, speeds, contacts, restitutions, one page',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_bag(parser)
     add_film_options(parser)
-    parser.add_argument('--tray', dest='trays_file', metavar='YAML', help='as --trays-file')
     parser.add_argument('-o', '--output', required=True, help='folder for the results')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
+    leave_out_film_options(parser)
+    parser.leave_out('--trays', '--workers')
     parser.set_defaults(run=run)
 
 
@@ -113,7 +113,7 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
             options.named[0],
             'nothing is told of its beads',
             f'give their diameter in the picture: nanorocks measure {film} --diameter-px 31 -o '
-            f'{shlex.quote(options.output)}; or a file, as --tray mine.yaml',
+            f'{shlex.quote(options.output)}; or a file, as --trays-file mine.yaml',
         )
     print_notices(recorded.notices)
     return recorded

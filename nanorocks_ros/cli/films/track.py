@@ -25,7 +25,7 @@ _PERCENT = 100.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.films.film_options import add_film_options
+    from nanorocks_ros.cli.films.film_options import add_film_options, leave_out_film_options
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser('track', help='track all beads of a film or bag')
@@ -42,6 +42,8 @@ def add_parser(commands: Any) -> None:
         '--first-frame', type=int, default=0, help='number of the first frame in FILE; default 0'
     )
     parser.add_argument('--force', action='store_true', help='replace files that exist')
+    leave_out_film_options(parser)
+    parser.leave_out('--compare', '--first-frame', '--force')
     parser.set_defaults(run=run)
 
 
