@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.cli.remedies import results_beside, with_own_files
+from nanorocks_ros.errors import ConfigurationError, NanorocksError
 from nanorocks_ros.records import CorRelation
 from nanorocks_ros.settings import priors_in_words
 
@@ -36,6 +38,7 @@ Examples:
 def add_parser(commands: Any) -> None:
     """Add the command."""
     from nanorocks_ros.cli.analyse_batch import add_options
+    from nanorocks_ros.cli.film_inputs import accept_films
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
@@ -44,6 +47,7 @@ def add_parser(commands: Any) -> None:
         epilog=_EPILOG,
     )
     add_bag(parser, many=True)
+    accept_films(parser, 'bags', _check_film)
     parser.add_argument(
         '-o',
         '--output',
@@ -78,6 +82,23 @@ def run(options: argparse.Namespace) -> int:
     return run_many(options) if is_batch(options) else _run_one(options)
 
 
+def _check_film(options: argparse.Namespace, film: str) -> None:
+    """Refuse a film of unknown beads: nothing in it says which of the trays it shows."""
+    from nanorocks_ros.cli.flags import told_settings
+
+    if told_settings(options, options.parameters) & {'trays', 'trays_file'}:
+        return
+    folder = shlex.quote(results_beside(film, 'measured'))
+    name = shlex.quote(film)
+    raise ConfigurationError(
+        film,
+        'does not say which trays it shows',
+        f'measure a film of your own: nanorocks measure {name} --diameter-px 31 -o {folder}, with '
+        'the diameter of a bead in px; or name the trays of the flight: '
+        f'nanorocks analyse {name} --trays 3',
+    )
+
+
 def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
@@ -109,11 +130,11 @@ def _run_one(options: argparse.Namespace) -> int:
         except NanorocksError as unwritten:
             error = unwritten
     for notice in analysis.notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
     if options.json:
         print(json.dumps(as_json(analysis), allow_nan=False))
     else:
-        _print(analysis)
+        _print(analysis, options)
     if written:
         print(written, file=sys.stderr)
     if error is not None:
@@ -138,13 +159,13 @@ def _scratch_folder() -> Path | None:
         return None
 
 
-def _print(analysis: Analysis) -> None:
+def _print(analysis: Analysis, options: argparse.Namespace) -> None:
     lost = f', {analysis.frames_lost} lost' if analysis.frames_lost else ''
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
         for line in tray_lines(analysis, results):
-            print(f'  {line}')
+            print(f'  {with_own_files(line, options)}')
 
 
 def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:

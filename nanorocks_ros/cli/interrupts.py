@@ -61,6 +61,8 @@ class Interrupts:
         if not issubclass(lost.exc_type, KeyboardInterrupt):
             self._hook(lost)
             return
-        timer = threading.Timer(_REPEAT_S, signal.raise_signal, [signal.SIGINT])
+        # To the thread that waits, so that it wakes up.
+        target = threading.main_thread().ident, signal.SIGINT
+        timer = threading.Timer(_REPEAT_S, signal.pthread_kill, target)
         timer.daemon = True
         timer.start()

@@ -79,6 +79,8 @@ def build_parser() -> CommandParser:
         for module in modules.values():
             import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
     parser.group_commands(COMMANDS)
+    # What completes them is made of all commands.
+    parser.set_defaults(parser=parser)
     return parser
 
 

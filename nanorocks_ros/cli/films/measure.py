@@ -56,13 +56,15 @@ def add_parser(commands: Any) -> None:
 class _Terminal:
     """Lines and bars on the terminal; lines go to standard error where JSON is printed."""
 
-    def __init__(self, *, is_json: bool) -> None:
-        self._stream = sys.stderr if is_json else sys.stdout
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._options = options
+        self._stream = sys.stderr if options.json else sys.stdout
 
     def say(self, line: str) -> None:
+        from nanorocks_ros.cli.remedies import with_own_files
         from nanorocks_ros.outputs.safe_text import printable
 
-        print(printable(line), file=self._stream, flush=True)
+        print(printable(with_own_files(line, self._options)), file=self._stream, flush=True)
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Progress]:
@@ -90,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         describe=_described,
     )
     try:
-        measured = measure_film(plan, _Terminal(is_json=options.json))
+        measured = measure_film(plan, _Terminal(options))
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('the same command continues') from interruption
     if options.json:

@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(_as_json(bag, compared), allow_nan=False))
     else:
-        _print(bag, compared)
+        _print(bag, compared, options)
     _write(options, bag)
     return 0 if bag.usable else EXIT_NOT_USABLE
 
@@ -201,7 +201,11 @@ def _comparison_as_json(comparison: TrackComparison | None) -> dict[str, Any] | 
     return plain
 
 
-def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
+def _print(
+    bag: TrackedBag, compared: dict[int, TrackComparison], options: argparse.Namespace
+) -> None:
+    from nanorocks_ros.cli.remedies import with_own_files
+
     print(f'{bag.frames} frames')
     for number in bag.trays:
         print(f'tray {number}: {len(bag.tracks[number])} frames tracked')
@@ -209,7 +213,7 @@ def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
             print(f'  {row["material"]}: {_seen(row)}, {row["tracks"]} tracks')
         for verdict in bag.verdicts.get(number, ()):
             for line in verdict.lines():
-                print(f'  {line}')
+                print(f'  {with_own_files(line, options)}')
         if number in compared:
             _print_comparison(compared[number])
 

@@ -22,7 +22,9 @@ class CommandParser(argparse.ArgumentParser):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         options.setdefault('formatter_class', _Formatter)
-        super().__init__(*arguments, **options, add_help=False)
+        # A help of its own.
+        options['add_help'] = False
+        super().__init__(*arguments, **options)
         self._rare: list[argparse.Action] = []
         self._sections: Mapping[str, Iterable[str]] = {}
         self.add_argument('-h', '--help', action=_Help, help='show the everyday options')
@@ -94,7 +96,7 @@ class CommandParser(argparse.ArgumentParser):
         return [action for action in self._actions if action.help is not argparse.SUPPRESS]
 
     def _help(
-        self, groups: list[tuple[str | None, str | None, list[argparse.Action]]], more: str
+        self, groups: Iterable[tuple[str | None, str | None, list[argparse.Action]]], more: str
     ) -> str:
         formatter = self._get_formatter()
         formatter.add_text(self.description)

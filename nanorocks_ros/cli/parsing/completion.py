@@ -35,9 +35,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the script; the exit code."""
-    from nanorocks_ros.cli.main import build_parser
-
-    print(completion_script(build_parser(), options.shell))
+    print(completion_script(options.parser, options.shell))
     return 0
 
 
