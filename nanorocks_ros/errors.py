@@ -5,6 +5,11 @@ Tested by ``test/nodes/base/test_diagnostics.py``.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 
 class NanorocksError(Exception):
     """An input that cannot be used, as one sentence: ``where: what; do``.
@@ -55,3 +60,20 @@ class SimulationError(NanorocksError):
 
 class DashboardError(NanorocksError):
     """A live page that cannot be served: its address, its port."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """A question with the words nearest to one that is not known; empty where none is near.
+
+    Parameters
+    ----------
+    word : str
+        As the user wrote it.
+    known : iterable of str
+        All words that are known.
+    """
+    from difflib import get_close_matches
+
+    by_letters = {name.casefold(): name for name in known}
+    nearest = get_close_matches(word.casefold(), by_letters, n=2, cutoff=0.7)
+    return f'did you mean {" or ".join(by_letters[name] for name in nearest)}?' if nearest else ''

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -30,18 +31,15 @@ _FIRST, _LAST = 1.75, 20.0
 
 def add_parser(kinds: Any) -> None:
     """Add the kind to those of ``nanorocks figure``."""
-    import argparse
-
     parser = kinds.add_parser(
         'cor',
         help=_TEXT,
         description=_TEXT,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('source', help='folder of results of `nanorocks analyse`, or a bag')
     parser.add_argument('-o', '--output', required=True, help='folder for the figures')
-    parser.add_argument('--tray', type=int, help='number of the tray; required with several trays')
+    add_tray(parser, 'number of the tray; required with several trays')
     parser.add_argument(
         '--runs', type=int, default=20, help='runs at each point of the search; default 20'
     )
@@ -75,6 +73,8 @@ def add_parser(kinds: Any) -> None:
         '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
     )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.leave_out('--beads', '--walls', '--widths', '--first', '--last')
+    parser.leave_out('--parameters', '--scheduler')
     parser.set_defaults(run=run)
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray, add_trays_file
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -31,9 +32,7 @@ def add_parser(kinds: Any) -> None:
             'speeds', help='folder of results of `nanorocks analyse`, or a table of speeds'
         )
         parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-        parser.add_argument(
-            '--tray', type=int, help='number of the tray; required with several trays'
-        )
+        add_tray(parser, 'number of the tray; required with several trays')
         parser.add_argument(
             '--wall-restitution',
             type=float,
@@ -49,7 +48,7 @@ def add_parser(kinds: Any) -> None:
         parser.add_argument(
             '--last', type=float, help='[s] end of the fit; default 20, or as analysed'
         )
-        parser.add_argument('--trays', default='', help='YAML file of trays; default: as analysed')
+        add_trays_file(parser, 'as analysed')
         parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         parser.add_argument('--force', action='store_true', help='replace a picture that exists')
         parser.set_defaults(run=run)
@@ -67,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(trays_of_results(table.parent, options.trays), number)
+    tray = tray_by_number(trays_of_results(table.parent, options.trays_file), number)
     cycles = read_cycles(table)
     values = _draw_figure(options, table, tray, cycles)
     if options.json:
