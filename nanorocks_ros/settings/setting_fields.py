@@ -145,7 +145,7 @@ def problem(row: SettingRow, value: Any) -> str | None:
     return _number_problem(value, row.bounds)
 
 
-def _hint(word: str, known: Iterable[str]) -> str:
+def _hint(word: str, known: Iterable[str] | Mapping[str, str]) -> str:
     hint = did_you_mean(word, known)
     return f', {hint}' if hint else ''
 
@@ -231,7 +231,9 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
     for message in messages:
         warnings.warn(message, FutureWarning, stacklevel=2)
     known = {row.name: row for row in rows(settings)}
-    problems = [f'no setting {name!r}{_hint(name, known)}' for name in values if name not in known]
+    # The group may be left out.
+    near = {name.rpartition('.')[2]: name for name in known} | {name: name for name in known}
+    problems = [f'no setting {name!r}{_hint(name, near)}' for name in values if name not in known]
     for name, value in values.items():
         text = problem(known[name], value) if name in known else None
         if text:
