@@ -100,7 +100,7 @@ class TurningPoints:
     def push(self, tracks: Tracks) -> None:
         """Follow the beads that are seen."""
         seen = tracks.seen
-        slots = self._slots_of(tracks.ids[seen])
+        slots = self._slots_of(tracks.ids)[seen]
         places, radii = tracks.positions[seen], tracks.radii[seen]
         self._add_outermost(places, radii)
         turns = np.empty((2 * slots.size, 4))
@@ -120,7 +120,7 @@ class TurningPoints:
             self._outermost[axis, 1].append(high[axis])
 
     def _slots_of(self, ids: NDArray[np.int32]) -> NDArray[np.int64]:
-        """Row of each bead in the state; most frames show the beads of the last one."""
+        """Row of each bead in the state; most frames have the beads of the last one."""
         if not np.array_equal(ids, self._last_ids):
             self._last_ids = ids
             self._last_slots = np.array([self._slot(number) for number in ids.tolist()], np.int64)
