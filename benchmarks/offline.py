@@ -2,7 +2,8 @@
 
 1080p JPEG frames of one tray, and of the whole plate with eight trays and all options; in CPU time
 of one thread, which depends little on other work of the machine. Decoding and analysis alternate;
-for one tray the best of three. OFFLINE_PLATE_BAG names an existing film of the plate:
+for one tray the best of three. The ratio is to decoding by OpenCV; the analysis decodes by
+`simplejpeg` where it is installed. OFFLINE_PLATE_BAG names an existing film of the plate:
 `nanorocks simulate --scene --bag BAG --duration 60 --first-shake 0.5`.
 """
 
@@ -26,6 +27,7 @@ from nanorocks_ros.pipeline.warm_up import (
     warm_up_cooling,
     warm_up_speed,
 )
+from nanorocks_ros.recordings import image_decoding
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
@@ -38,6 +40,14 @@ _ROUNDS = 3
 
 def _decode(path: Path) -> int:
     return sum(1 for _ in BagFrames(path).frames())
+
+
+def _decode_by_opencv(path: Path) -> int:
+    library, image_decoding.simplejpeg = image_decoding.simplejpeg, None
+    try:
+        return _decode(path)
+    finally:
+        image_decoding.simplejpeg = library
 
 
 def _timed(work) -> float:
@@ -64,6 +74,7 @@ def measure_plate(path: str) -> None:
     def note(done: int, frames: int) -> None:
         peaks[round(3 * done / frames, 9)] = _peak_mb()
 
+    opencv = _timed(lambda: _decode_by_opencv(Path(path)))
     decode = _timed(lambda: _decode(Path(path)))
     settings = with_values(PipelineSettings(), PLATE, 'benchmark')
     before = _peak_mb()
@@ -71,7 +82,7 @@ def measure_plate(path: str) -> None:
     analysis = _timed(lambda: analyse(path, settings, progress=note, scratch=folder))
     third = min(at for at in peaks if at >= 1.0)
     frames = BagFrames(path).count
-    print(json.dumps([frames, decode, analysis, before, peaks[third], _peak_mb()]))
+    print(json.dumps([frames, (opencv, decode, analysis), before, peaks[third], _peak_mb()]))
 
 
 def report() -> None:
@@ -87,32 +98,35 @@ def _print_tray(path: Path) -> None:
     filmed = film_into_bag(
         path, SimulationSettings(), duration=_SECONDS, quality=90, progress=lambda *_: None
     )
-    pairs = [
-        (_timed(lambda: _decode(path)), _timed(lambda: analyse(path, PipelineSettings())))
+    rounds = [
+        (
+            _timed(lambda: _decode_by_opencv(path)),
+            _timed(lambda: _decode(path)),
+            _timed(lambda: analyse(path, PipelineSettings())),
+        )
         for _ in range(_ROUNDS)
     ]
     print('one tray')
-    _print(
-        filmed['frames'],
-        min(seconds for seconds, _ in pairs),
-        min(seconds for _, seconds in pairs),
-    )
+    _print(filmed['frames'], [min(seconds) for seconds in zip(*rounds, strict=True)])
 
 
 def _print_plate(bag: Path) -> None:
     # A separate process, so that its memory is that of the analysis.
     call = f'from benchmarks.offline import measure_plate; measure_plate({str(bag)!r})'
     done = subprocess.run([sys.executable, '-c', call], check=True, stdout=subprocess.PIPE)
-    frames, decode, analysis, before, third, peak = json.loads(done.stdout)
+    frames, seconds, before, third, peak = json.loads(done.stdout)
     print(f'\neight trays, everything on, {frames / 30.0:.0f} s')
-    _print(frames, decode, analysis)
+    _print(frames, seconds)
     print(
         f'peak memory    {peak:7.0f} MB  ({before:.0f} MB before the first frame, {third:.0f} MB '
         'after a third of them)'
     )
 
 
-def _print(frames: int, decode: float, analysis: float) -> None:
-    print(f'decode only    {frames / decode:7.1f} frames/s')
-    print(f'whole analysis {frames / analysis:7.1f} frames/s')
-    print(f'ratio          {decode / analysis:7.2f}  (1: the analysis costs nothing)')
+def _print(frames: int, seconds: list[float]) -> None:
+    """Print frames per second; `seconds` of OpenCV, of decoding as here and of the analysis."""
+    opencv, decode, analysis = seconds
+    print(f'decode only, by OpenCV {frames / opencv:7.1f} frames/s')
+    print(f'decode only, as here   {frames / decode:7.1f} frames/s')
+    print(f'whole analysis         {frames / analysis:7.1f} frames/s')
+    print(f'ratio to OpenCV        {opencv / analysis:7.2f}  (1: as fast as decoding)')

@@ -63,7 +63,7 @@ def is_whole_jpeg(content: bytes | memoryview) -> bool:
     return bytes(content[:2]) == START and tail.endswith(_END)
 
 
-def jpeg_head(content: bytes) -> JpegHead | None:
+def jpeg_head(content: bytes | memoryview) -> JpegHead | None:
     """Header of a JPEG; None if the content is not a JPEG or has no scan."""
     if content[:2] != START:
         return None

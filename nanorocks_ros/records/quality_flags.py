@@ -100,9 +100,15 @@ def field_names(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
+@cache
+def _array_names(kind: Any) -> tuple[str, ...]:
+    """Names of the fields of a kind of records that may hold arrays, by their annotations."""
+    return tuple(field.name for field in fields(kind) if 'NDArray' in str(field.type))
+
+
 def freeze_arrays(record: Any) -> None:
     """Make the arrays of a record read-only."""
-    for name in field_names(record.__class__):
+    for name in _array_names(record.__class__):
         value = getattr(record, name)
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()

@@ -133,16 +133,17 @@ class DecayLibrary:
             np.zeros((np.size(restitution), len(NUISANCES))) if nuisances is None else nuisances,
         )
         rate = design.losses @ self.base
-        log_speed = np.empty((rate.size, self.distances.size))
-        for k, distance in enumerate(self.distances):
-            log_speed[:, k] = design.terms(rate * distance) @ self.coefficients[:, k]
-            log_speed[:, k] -= np.log1p(rate * distance)
+        # For all distances at once: only the weight of the second terms depends on the distance.
+        decay = rate[:, np.newaxis] * self.distances
+        plain, weighted = np.split(self.coefficients, [design.plain.shape[1]])
+        log_speed = design.plain @ plain + design.weighted @ weighted / (1.0 + decay)
+        log_speed -= np.log1p(decay)
         if friction is not None:
             terms = friction_terms(design.losses, design.nuisances, friction)
-            rubbing = self.rubbing * friction[:, 0]
-            for k, distance in enumerate(self.distances):
-                offset, matrix = rough_design(terms, rate * distance, rubbing * distance)
-                log_speed[:, k] += offset + matrix @ self.friction_coefficients[:, k]
+            rubbing = (self.rubbing * friction[:, :1]) * self.distances
+            plain, weighted = np.split(self.friction_coefficients, 2)
+            log_speed -= np.log1p(rubbing / (1.0 + decay))
+            log_speed += terms @ plain + terms @ weighted / (1.0 + decay + rubbing)
         return log_speed
 
 

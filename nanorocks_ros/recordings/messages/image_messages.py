@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.limits import IMAGE_PIXELS, is_too_large
+from nanorocks_ros.recordings.image_decoding import decoded_image
 from nanorocks_ros.recordings.jpeg_header import START as JPEG_START
 from nanorocks_ros.recordings.jpeg_header import is_whole_jpeg
 from nanorocks_ros.records import NS, Frame
@@ -48,7 +48,6 @@ _ENCODINGS = {
     'yuv422_yuy2': _Encoding(2, 'bgr8', cv2.COLOR_YUV2BGR_YUY2),
     'yuyv': _Encoding(2, 'bgr8', cv2.COLOR_YUV2BGR_YUY2),
 }
-_READ = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 # Video codecs and the first bytes of image formats.
 _VIDEO_CODECS = frozenset({'h264', 'h265', 'hevc', 'vp9', 'av1'})
 _STARTS = {
@@ -189,7 +188,7 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
     stamp_ns = valid_stamp_ns(message, where)
     # OpenCV decodes a truncated JPEG without an error and fills the missing part with gray.
     complete = data[:2].tobytes() != JPEG_START or is_whole_jpeg(data.data)
-    image = _decoded(data) if complete else None
+    image = decoded_image(data) if complete else None
     if image is None:
         kind = image_kind(message)
         if kind in _VIDEO_CODECS:
@@ -206,16 +205,6 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
             'omit this frame, or record it again',
         )
     return Frame(stamp_ns=stamp_ns, encoding='mono8' if image.ndim == 2 else 'bgr8', image=image)
-
-
-def _decoded(data: NDArray[np.uint8], flags: int = _READ) -> NDArray[np.uint8] | None:
-    try:
-        image = cv2.imdecode(data, flags)
-    except cv2.error as error:
-        if is_too_large(error):
-            raise IMAGE_PIXELS.exceeded(None, FrameError, 'image') from error
-        return None
-    return None if image is None else np.asarray(image, dtype=np.uint8)
 
 
 def encode_jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
@@ -263,13 +252,13 @@ def frame_to_jpeg(frame: Frame, quality: int) -> bytes:
 
 
 def is_decodable(content: bytes) -> bool:
-    """Whether OpenCV can decode a compressed image."""
-    return _decoded(_bytes_of(content)) is not None
+    """Whether a compressed image can be decoded."""
+    return decoded_image(_bytes_of(content)) is not None
 
 
 def decoded_gray(content: bytes) -> NDArray[np.uint8]:
     """Brightness of a compressed image, (height, width); empty if it cannot be decoded."""
-    image = _decoded(_bytes_of(content), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+    image = decoded_image(_bytes_of(content), gray=True)
     return np.empty((0, 0), dtype=np.uint8) if image is None else image
 
 

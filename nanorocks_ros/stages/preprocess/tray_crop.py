@@ -6,7 +6,6 @@ Tested by ``test/stages/preprocess/test_preprocessor.py``.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 import cv2
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
 _NEGLIGIBLE_PX = 0.04
 _SIGNIFICANT = 2.0
 _WHOLE = (0.0, 0.0)
+_NOT_REGISTERED = Shift(UNKNOWN, UNKNOWN, UNKNOWN)
 # Largest distance from the plate: beyond it something that moves beside the tray was registered.
 _STRAYED_PX = 1.0
 
@@ -154,8 +154,8 @@ class TrayCrop:
                 self.pending |= Quality.STABILISATION_LOST
                 self.shift = plate
                 self._registration.set_shift(plate)
-        moved = (UNKNOWN,) * 3 if self.shift is None else astuple(self.shift)
-        self._jitter.push(stamp_ns / NS, *moved)
+        moved = self.shift or _NOT_REGISTERED
+        self._jitter.push(stamp_ns / NS, moved.x, moved.y, moved.error)
         last, last_ns = self._last, self._last_ns
         self._last, self._last_ns = self.shift, stamp_ns
         self.velocity, self.velocity_error = (UNKNOWN, UNKNOWN), UNKNOWN

@@ -87,7 +87,10 @@ class TurningPoints:
 
     def __init__(self, radius: float) -> None:
         self._radius = radius
+        # Row of each bead in the state, in the order in which they were seen first.
         self._slots: dict[int, int] = {}
+        self._last_ids = np.empty(0, dtype=np.int32)
+        self._last_slots = np.empty(0, dtype=np.int64)
         self._state = np.zeros((256, 2, 2))
         self._turns: dict[tuple[int, int], list[tuple[float, float]]] = {
             (axis, high): [] for axis in range(2) for high in range(2)
@@ -97,8 +100,7 @@ class TurningPoints:
     def push(self, tracks: Tracks) -> None:
         """Follow the beads that are seen."""
         seen = tracks.seen
-        ids = tracks.ids[seen]
-        slots = np.array([self._slot(number) for number in ids.tolist()], dtype=np.int64)
+        slots = self._slots_of(tracks.ids)[seen]
         places, radii = tracks.positions[seen], tracks.radii[seen]
         self._add_outermost(places, radii)
         turns = np.empty((2 * slots.size, 4))
@@ -116,6 +118,13 @@ class TurningPoints:
         for axis in range(2):
             self._outermost[axis, 0].append(low[axis])
             self._outermost[axis, 1].append(high[axis])
+
+    def _slots_of(self, ids: NDArray[np.int32]) -> NDArray[np.int64]:
+        """Row of each bead in the state; most frames have the beads of the last one."""
+        if not np.array_equal(ids, self._last_ids):
+            self._last_ids = ids
+            self._last_slots = np.array([self._slot(number) for number in ids.tolist()], np.int64)
+        return self._last_slots
 
     def _slot(self, number: int) -> int:
         slot = self._slots.setdefault(number, len(self._slots))

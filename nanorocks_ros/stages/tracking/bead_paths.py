@@ -33,6 +33,7 @@ class Moment:
     displacement: NDArray[np.float64]
 
 
+@compiled
 def links_from(before: NDArray[np.int64], links: NDArray[np.int32]) -> NDArray[np.int32]:
     """Links of a frame, from the row of each bead in the frame before and the links of that.
 
@@ -43,9 +44,11 @@ def links_from(before: NDArray[np.int64], links: NDArray[np.int32]) -> NDArray[n
     links : ndarray of int32, (frames, m + 1)
         No frames for the first frame of a recording.
     """
-    longer = np.full((len(links) + 1, before.size + 1), -1, np.int32)
-    longer[0, :-1] = np.arange(before.size)
-    longer[1:, :-1] = links[:, before]
+    longer = np.full((links.shape[0] + 1, before.size + 1), -1, np.int32)
+    for k in range(before.size):
+        longer[0, k] = k
+        if before[k] >= 0:
+            longer[1:, k] = links[:, before[k]]
     return longer
 
 
@@ -54,10 +57,41 @@ def paths_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions some frames ago of the beads seen since then, (lags, n, 2), and their radii."""
     last = moments[-1]
-    seen = last.links[lags[-1], :-1] >= 0
-    rows = [last.links[k, :-1][seen] for k in lags]
-    positions = [moments[-1 - k].positions[chosen] for k, chosen in zip(lags, rows, strict=True)]
-    return np.stack(positions), last.radii[seen]
+    positions = tuple(moments[-1 - k].positions for k in lags)
+    return _joined(positions, last.links, lags, last.radii)
+
+
+@compiled
+def _joined(
+    positions: tuple[NDArray[np.float64], ...],
+    links: NDArray[np.int32],
+    lags: tuple[int, ...],
+    radii: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    seen = np.flatnonzero(links[lags[-1], :-1] >= 0)
+    paths = np.empty((len(lags), seen.size, 2))
+    for number in range(len(lags)):
+        for k in range(seen.size):
+            paths[number, k] = positions[number][links[lags[number], seen[k]]]
+    return paths, radii[seen]
+
+
+@compiled
+def body_bends(
+    paths: NDArray[np.float64], radii: NDArray[np.float64], ratio: float
+) -> NDArray[np.float64]:
+    """Mean bend of each group of beads that touch, (bodies, 2).
+
+    Parameters
+    ----------
+    paths : ndarray (3, n, 2)
+        Positions at three moments, the last one first.
+    radii : ndarray (n,)
+    ratio : float
+        Of the time between the later two moments to that between the earlier two.
+    """
+    bends = paths[0] - paths[1] - ratio * (paths[1] - paths[2])
+    return body_means(bends, paths[0], radii)
 
 
 def bend(

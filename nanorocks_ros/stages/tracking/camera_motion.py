@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.picture_jitter import JitterMeter
 from nanorocks_ros.stages.tracking.bead_paths import (
     Moment,
     bend,
-    body_means,
+    body_bends,
     column_medians,
     links_from,
     nearest_rows,
@@ -196,12 +197,7 @@ class CameraMotion:
         if len(bends) < _FEWEST_BODIES:
             self._misfit += (1.0 - self._misfit) * share
             return _Fate.STILL if still else _Fate.UNKNOWN
-        common, noise = _common_bend(bends)
-        # A shift of the tray that was registered wrongly seems to be one of all beads.
-        noise = np.hypot(noise, _BEND_ERROR * error)
-        noise = np.hypot(noise, _LENS_SHARE * math.hypot(moved[0], moved[1]))
-        of_tray = float(np.sum(((common + moved) / noise) ** 2))
-        of_camera = float(np.sum((common / noise) ** 2))
+        of_tray, of_camera = _chi_squares(bends, moved, error)
         likelihood = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
         # Successive bends share the motion within a lag.
         self._evidence += likelihood / frames
@@ -211,15 +207,34 @@ class CameraMotion:
 
     def _bends(self, frames: int, ratio: float) -> NDArray[np.float64]:
         """Bends of the paths of all bodies that are in all frames from the first on, (n, 2)."""
-        lags = (0, frames, 2 * frames)
-        (later, middle, earlier), radii = paths_of(self._moments, lags)
-        return body_means(bend(later, middle, earlier, ratio), later, radii)
+        paths, radii = paths_of(self._moments, (0, frames, 2 * frames))
+        return body_bends(paths, radii, ratio)
 
 
-def _common_bend(bends: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Median of the bends, and its error."""
+@compiled
+def _chi_squares(
+    bends: NDArray[np.float64], moved: NDArray[np.float64], error: float
+) -> tuple[float, float]:
+    """Squares of the common bend that the motions of tray and camera leave, over its variance.
+
+    Parameters
+    ----------
+    bends : ndarray (bodies, 2), [px]
+    moved : ndarray (2,), [px]
+        Bend of the motion of the picture.
+    error : float, [px]
+        Of a registration.
+    """
     common = column_medians(bends)
-    deviation = _DEVIATION * column_medians(np.abs(bends - common))
-    count = len(bends)
-    error = _MEDIAN_ERROR * deviation / math.sqrt(count) * (1.0 + _FEW_BODIES / (count - 1))
-    return common, np.hypot(error, _LEAST_ERROR)
+    deviation = column_medians(np.abs(bends - common))
+    count = bends.shape[0]
+    scatter = _MEDIAN_ERROR * _DEVIATION * (1.0 + _FEW_BODIES / (count - 1)) / math.sqrt(count)
+    # A shift of the tray that was registered wrongly seems to be one of all beads.
+    shared = _LEAST_ERROR**2 + (_BEND_ERROR * error) ** 2
+    shared += _LENS_SHARE**2 * (moved[0] ** 2 + moved[1] ** 2)
+    of_tray = of_camera = 0.0
+    for axis in range(2):
+        variance = (scatter * deviation[axis]) ** 2 + shared
+        of_tray += (common[axis] + moved[axis]) ** 2 / variance
+        of_camera += common[axis] ** 2 / variance
+    return of_tray, of_camera

@@ -8,9 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nanorocks_ros.records import Quality
+from nanorocks_ros.stages.tracking.recognition_kernels import (
+    SUMS_OF_TRACK,
+    Discs,
+    add_displacements,
+    add_frame,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,12 +27,8 @@ if TYPE_CHECKING:
 _REST_RADII, _REST_ERRORS = 0.25, 8.0
 # A track tells whether its disc moves when it lasts for this part of the film.
 _LONG_SHARE = 0.25
-# Discs of beads that touch are apart by the sum of their radii in space; edges err by some of it.
-_OVERLAP = 0.8
 # Frames of the longer displacements; how many tell, and their squares over those of errors.
 _LONG_LAG, _LEAST_DISPLACEMENTS, _LEAST_SIGNAL = 4, 100, 4.0
-# Speeds above this part of the limit: faster beads have lost their tracks.
-_NEAR_LIMIT = 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +123,7 @@ class RecognitionCounter:
         for k, (counter, species) in enumerate(
             zip(self._species, self._tray.species, strict=True)
         ):
-            counter.push(tracks, tracks.species == k, species.count, max_speed)
+            counter.push(tracks, k, species.count, max_speed)
 
     def counts(self) -> tuple[SpeciesCounts, ...]:
         """What was counted so far, for each species; empty before the first image."""
@@ -162,48 +163,36 @@ class _SpeciesCounter:
         self.seen = self.tracked = self.complete = self.overlapping = 0
         self.fast = self.speeds = 0
         # By number of the track: images, least and largest place, sums of radius and error.
-        self._sums = np.empty((0, 7))
+        self._sums = np.empty((0, SUMS_OF_TRACK))
         self.spread = _Spread()
 
-    def push(
-        self, tracks: Tracks, own: NDArray[np.bool_], expected: int, max_speed: float
-    ) -> None:
-        seen = own & tracks.seen
-        count = int(seen.sum())
-        self.tracked += int(own.sum())
-        self.seen += count
-        self.complete += count >= expected
-        self.overlapping += self._overlapping(tracks.positions[seen], tracks.radii[seen])
-        speeds = np.hypot(*tracks.velocities[own].T)
-        self.speeds += int(np.isfinite(speeds).sum())
-        self.fast += int((speeds > _NEAR_LIMIT * max_speed).sum())
-        self._extend(tracks, seen)
-        self.spread.push(tracks.ids[seen], tracks.positions[seen], tracks.position_errors[seen])
-
-    def _overlapping(self, places: NDArray[np.float64], radii: NDArray[np.float64]) -> int:
-        """Discs that overlap another one more than two beads can."""
-        if len(places) < 2:
-            return 0
-        pairs = cKDTree(places).query_pairs(2.0 * float(radii.max()), output_type='ndarray')
-        apart = np.hypot(*(places[pairs[:, 0]] - places[pairs[:, 1]]).T)
-        touching = self._least_distance * (radii[pairs[:, 0]] + radii[pairs[:, 1]])
-        return int(np.unique(pairs[apart < _OVERLAP * touching]).size)
-
-    def _extend(self, tracks: Tracks, seen: NDArray[np.bool_]) -> None:
-        """Add the places of the discs that are seen to those of their tracks."""
-        beads, places = tracks.ids[seen], tracks.positions[seen]
-        if beads.size == 0:
-            return
-        sums = self._sums_up_to(int(beads.max()))
-        sums[beads, 0] += 1.0
-        sums[beads, 1:3] = np.minimum(sums[beads, 1:3], places)
-        sums[beads, 3:5] = np.maximum(sums[beads, 3:5], places)
-        sums[beads, 5] += tracks.radii[seen]
-        sums[beads, 6] += tracks.position_errors[seen]
+    def push(self, tracks: Tracks, species: int, expected: int, max_speed: float) -> None:
+        """Count the discs of the species with this index in the tracks of an image."""
+        discs = Discs(
+            tracks.ids,
+            tracks.species,
+            tracks.positions,
+            tracks.position_errors,
+            tracks.radii,
+            tracks.velocities,
+            tracks.seen,
+        )
+        # The numbers of the tracks rise.
+        last = int(tracks.ids[-1]) if tracks.ids.size else -1
+        tracked, seen, overlapping, speeds, fast = add_frame(
+            discs, species, self._least_distance, max_speed, self._sums_up_to(last)
+        )
+        self.tracked += tracked
+        self.seen += seen
+        self.complete += seen >= expected
+        self.overlapping += overlapping
+        self.speeds += speeds
+        self.fast += fast
+        self.spread.push(discs, species)
 
     def _sums_up_to(self, bead: int) -> NDArray[np.float64]:
         if bead >= len(self._sums):
-            more = np.zeros((bead + 1, 7))
+            more = np.zeros((bead + 1, SUMS_OF_TRACK))
             more[:, 1:3], more[:, 3:5] = math.inf, -math.inf
             self._sums = np.concatenate([self._sums, more])
         return self._sums
@@ -235,26 +224,16 @@ class _Spread:
     """How squared displacements grow from one frame to several."""
 
     def __init__(self) -> None:
-        self._frames: deque[tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]] = (
-            deque(maxlen=_LONG_LAG + 1)
-        )
+        self._frames: deque[Discs] = deque(maxlen=_LONG_LAG + 1)
         # By lag: displacements, sum of their squares, and what errors add to it.
         self._sums = {lag: np.zeros(3) for lag in (1, _LONG_LAG)}
 
-    def push(
-        self,
-        beads: NDArray[np.int32],
-        places: NDArray[np.float64],
-        errors: NDArray[np.float64],
-    ) -> None:
-        self._frames.append((beads, places, errors))
+    def push(self, discs: Discs, species: int) -> None:
+        """Add the displacements of the discs of a species up to the next image."""
+        self._frames.append(discs)
         for lag, sums in self._sums.items():
             if len(self._frames) > lag:
-                before = self._frames[-1 - lag]
-                _, own, their = np.intersect1d(beads, before[0], True, return_indices=True)
-                squares = ((places[own] - before[1][their]) ** 2).sum()
-                noise = 2.0 * (errors[own] ** 2 + before[2][their] ** 2).sum()
-                sums += own.size, squares, noise
+                add_displacements(discs, self._frames[-1 - lag], species, sums)
 
     @property
     def exponent(self) -> float:

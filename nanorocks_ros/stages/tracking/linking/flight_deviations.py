@@ -261,10 +261,11 @@ def straight_variance(squares: NDArray[np.float64]) -> float:
         return np.nan
     for _ in range(_ROUNDS):
         total, total_squares, rest, rest_squares = 0.0, 0.0, 0.0, 0.0
+        # The densities of both over each other, as one exponential of the square.
+        odds, falls = share / narrow * wide, 0.5 / narrow - 0.5 / wide
         for square in squares:
-            straight = share / narrow * math.exp(-0.5 * square / narrow)
-            deflected = (1.0 - share) / wide * math.exp(-0.5 * square / wide)
-            sum_of_both = straight + deflected
+            straight = odds * math.exp(-falls * square)
+            sum_of_both = straight + 1.0 - share
             probability = straight / sum_of_both if sum_of_both > 0.0 else 0.0
             total += probability
             total_squares += probability * square
