@@ -63,7 +63,8 @@ _GROUPS = (
 )
 
 
-def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown."""
     lines = ['| ' + ' | '.join(header) + ' |']
     lines.append('|' + '|'.join(' --- ' for _ in lines[0].split(' | ')) + '|')
     lines += ['| ' + ' | '.join(cell.replace('|', '\\|') for cell in row) + ' |' for row in rows]
@@ -78,7 +79,7 @@ def topics_page() -> str:
         'number of a tray. All are reliable; a latched topic is transient local, so that a late '
         'subscriber still gets the last message.\n\n'
     )
-    text += _table(
+    text += table(
         ('topic', 'type', 'depth', 'latched', 'content'),
         (
             (
@@ -93,7 +94,7 @@ def topics_page() -> str:
     )
     text += (
         '\nBeside these, every node publishes `/diagnostics` once a second, and `bag_player` '
-        '`/clock`.\n\n# Array layouts\n\n'
+        '`/clock`.\n\n## Array layouts\n\n'
         'The arrays are `std_msgs/Float32MultiArray`: `layout.dim[0].label` holds the field '
         'names, separated by commas. SI units; NaN means "not known yet". `epoch` tells what '
         '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
@@ -101,8 +102,8 @@ def topics_page() -> str:
     )
     for product in PRODUCTS:
         array = layout(product.record)
-        text += f'\n## {array.name}\n\n{array.doc}\n\n'
-        text += _table(
+        text += f'\n### {array.name}\n\n{array.doc}\n\n'
+        text += table(
             ('element', 'field', 'unit', 'meaning'),
             (
                 (str(index), f'`{field.name}`', field.unit, field.doc)
@@ -119,7 +120,7 @@ def _beads_section() -> str:
     """The array whose length is that of the list of beads."""
     array = beads_layout()
     head, row = len(array.head), len(array.bead)
-    text = f'\n## BeadsTruth\n\n{array.doc}\n\n'
+    text = f'\n### BeadsTruth\n\n{array.doc}\n\n'
     text += (
         f'{head} elements (`layout.dim[0]`), then {row} for each bead (`dim[1]`: how many beads, '
         '`dim[2]`: the names); a bead keeps its row, which is its identity.\n\n'
@@ -128,7 +129,7 @@ def _beads_section() -> str:
         *((str(index), field) for index, field in enumerate(array.head)),
         *((f'{head + index} + {row} i', field) for index, field in enumerate(array.bead)),
     ]
-    return text + _table(
+    return text + table(
         ('element', 'field', 'unit', 'meaning'),
         ((place, f'`{field.name}`', field.unit, field.doc) for place, field in fields),
     )
@@ -140,7 +141,7 @@ def parameters_page() -> str:
     for title, remark, settings in _GROUPS:
         text += f'\n## {title}\n\n{type(settings).__doc__}\n\n'
         text += f'{remark}\n\n' if remark else ''
-        text += _table(
+        text += table(
             ('parameter', 'default', 'unit', 'range', 'meaning'),
             (
                 (f'`{row.name}`', _default(row.default), row.unit, _range(row), row.doc)
@@ -158,7 +159,7 @@ def flags_page() -> str:
         'of `nanorocks analyse` and `/diagnostics` name them. '
         '[speed.md](../method/speed.md#the-flags) says when the less obvious ones are set.\n\n'
     )
-    return text + _table(
+    return text + table(
         ('flag', 'value', 'meaning', 'what to do'),
         (
             (f'`{flag.name.lower()}`', str(flag.value), FLAGS[flag].text, FLAGS[flag].remedy)
