@@ -18,7 +18,6 @@ import nanorocks_ros
 from nanorocks_ros.cli.main import build_parser
 from nanorocks_ros.tools.docs_pages.citation_page import citation_page
 from nanorocks_ros.tools.docs_pages.command_pages import command_line_page
-from nanorocks_ros.tools.docs_pages.python_page import python_page
 from nanorocks_ros.tools.docs_pages.site_index import tables_of_contents
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,7 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent
 project = 'nanorocks_ros'
 author = 'The nanorocks_ros developers'
 version = release = nanorocks_ros.__version__
-extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
+extensions = ['myst_parser']
 root_doc = 'README'
 include_patterns = [
     'README.md',
@@ -45,15 +44,6 @@ myst_fence_as_directive = ['math']
 # Options have two dashes, and patterns straight quotes.
 smartquotes = False
 
-# A class named in a docstring may be of another package, or private; links between pages are all
-# checked.
-nitpick_ignore_regex = [('py:.*', '.*')]
-autodoc_member_order = 'bysource'
-autodoc_typehints = 'none'
-autodoc_preserve_defaults = True
-napoleon_google_docstring = False
-napoleon_use_rtype = False
-
 html_math_renderer = 'mathml'
 html_theme = 'furo'
 html_title = f'nanorocks_ros {version}'
@@ -69,7 +59,6 @@ highlight_language = 'none'
 
 _MADE = {
     'command line': lambda: command_line_page(build_parser()),
-    'python': lambda: python_page(nanorocks_ros),
     'citation': lambda: citation_page(ROOT / 'CITATION.cff'),
 }
 _MARK = re.compile(r'^.*<!-- made for the site: (.+) -->$', re.MULTILINE)

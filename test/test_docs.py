@@ -10,7 +10,7 @@ from page_code import PAGES, ROOT
 
 from nanorocks_ros import records
 
-SUFFIXES = r'(_error|_errors|_lower|_upper|_[xy]|_[12])*$'
+SUFFIXES = r'(_error|_errors|_lower|_upper|_68|_[xy]|_[12])*$'
 LINK = re.compile(r'(?<!`)\[[^\]]*\]\(([^)\s]+)\)')
 
 

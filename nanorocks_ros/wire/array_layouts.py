@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord
 
 
-_ENUMERATIONS = {
+ENUMERATIONS = {
     'method': SpeedMethod,
     'quality': Quality,
     'status': CorStatus,
@@ -42,15 +42,16 @@ _ENUMERATIONS = {
     'size_status': SizeStatus,
     'sticking_status': StickingStatus,
 }
+"""What the numbers of a field stand for, by the name of the field."""
 # By the type that a record declares.
 _WHOLE = {'int': int, 'bool': bool}
-# Fields of the array that a record keeps as an integer stamp.
-_STAMPS = {
+STAMPS = {
     'time': 'stamp_ns',
     'cycle_start': 'cycle_start_ns',
     'known': 'known_ns',
     'first_merge': 'first_merge_ns',
 }
+"""Fields that a record keeps as an integer stamp, and the names of the stamps."""
 _FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
 _CONSTANT = re.compile(r'^float32\s+([A-Z]\w*)\s*=\s*(\d+)$')
 
@@ -126,10 +127,10 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
 
 def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
-    value = flat_value(record, _STAMPS.get(name, name))
+    value = flat_value(record, STAMPS.get(name, name))
     if value is None:
         return math.nan
-    return (value - epoch_ns) / NS if name in _STAMPS else float(value)
+    return (value - epoch_ns) / NS if name in STAMPS else float(value)
 
 
 def from_array(
@@ -170,7 +171,7 @@ def from_array(
     numbers = {field.name: float(value) for field, value in zip(fields, values, strict=True)}
     items: dict[str, Any] = {'tray': tray, **nested_fields(record_type, numbers)}
     for name, number in numbers.items():
-        in_record = _STAMPS.get(name, name)
+        in_record = STAMPS.get(name, name)
         if in_record in items or in_record not in kinds:
             continue
         try:
@@ -186,8 +187,8 @@ def from_array(
 
 
 def _value(name: str, kind: object, value: float, epoch_ns: int) -> object:
-    if name in _STAMPS:
+    if name in STAMPS:
         return epoch_ns + round(value * NS) if math.isfinite(value) else None
     if kind in _WHOLE:
         return _WHOLE[kind](value)
-    return _ENUMERATIONS[name](int(value)) if name in _ENUMERATIONS else value
+    return ENUMERATIONS[name](int(value)) if name in ENUMERATIONS else value

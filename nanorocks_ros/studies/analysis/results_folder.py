@@ -115,7 +115,7 @@ def write_results(
             fresh = Path(scratch) / 'fresh'
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
-            provenance = _provenance(source, settings)
+            provenance = _provenance(source, settings) | _truth(analysis)
             for number, results in analysis.trays.items():
                 for product in MEASURED:
                     if records := results.of(product.record):
@@ -184,6 +184,22 @@ def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
         **{row.name: str(row.default) for row in rows(settings)},
         **metadata_of_settings(settings),
     }
+
+
+def truth_keys(tray: int) -> tuple[str, str]:
+    """Keys of the true restitutions of a tray, of beads and of walls, in the results bag."""
+    return f'truth.tray_{tray}.restitution', f'truth.tray_{tray}.wall_restitution'
+
+
+def _truth(analysis: Analysis) -> dict[str, str]:
+    """The true restitutions of simulated trays, which figures show beside those measured."""
+    known: dict[str, str] = {}
+    for number, results in analysis.trays.items():
+        if results.truth:
+            last = results.truth[-1]
+            values = f'{last.restitution:g}', f'{last.wall_restitution:g}'
+            known |= dict(zip(truth_keys(number), values, strict=True))
+    return known
 
 
 def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:

@@ -50,6 +50,8 @@ _RESTITUTIONS = (
     *('initial_speed', 'initial_speed_error', 'haff_time', 'haff_time_error'),
     *('restitution', 'restitution_lower', 'restitution_upper'),
     *('wall_restitution', 'wall_restitution_lower', 'wall_restitution_upper'),
+    *('restitution_lower_68', 'restitution_upper_68'),
+    *('wall_restitution_lower_68', 'wall_restitution_upper_68'),
     *('correlation', 'paper_restitution'),
     *('mean_restitution', 'mean_restitution_error'),
     *('mean_wall_restitution', 'mean_wall_restitution_error'),

@@ -90,19 +90,20 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     """
     columns = columns_of(tracked)
     if path.suffix == '.parquet':
-        write_parquet(path, columns, _pieces(tracked), _provenance(tracked))
+        write_parquet(path, columns, track_pieces(tracked), _provenance(tracked))
         return
     with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
         units = ', '.join(f'{column.name} [{column.unit}]' for column in columns if column.unit)
         stream.write(f'# {units}\n')
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow([column.name for column in columns])
-        for piece in _pieces(tracked):
+        for piece in track_pieces(tracked):
             texts = [_as_text(piece[column.name]) for column in columns]
             writer.writerows(zip(*texts, strict=True))
 
 
-def _pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+def track_pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+    """The rows of the table, by column, frame by frame."""
     for number in tracked.trays:
         frames = zip(tracked.tracks[number], tracked.numbers[number], strict=True)
         for tracks, frame in frames:
