@@ -24,7 +24,7 @@ TABLES = '.npz', '.parquet'
 """Suffixes of these files."""
 
 _AXES = 'xyz'
-_EVENT_COLUMNS = (
+EVENT_COLUMNS = (
     Column(name='run', kind='int32', unit='1', doc='number of the run'),
     Column(name='time', unit='s', doc='since the shaking event'),
     Column(name='type', kind='string', doc='pair, wall, merge or fix'),
@@ -90,21 +90,21 @@ def write_events(path: Path, simulated: SimulatedRuns) -> None:
     """
     pieces = (_event_rows(run) for run in simulated.runs)
     if path.suffix == '.parquet':
-        write_parquet(path, _EVENT_COLUMNS, pieces, simulated.provenance())
+        write_parquet(path, EVENT_COLUMNS, pieces, simulated.provenance())
         return
     rows = list(pieces)
 
     def joined(name: str) -> Callable[[], Any]:
         return lambda: np.concatenate([row[name] for row in rows])
 
-    arrays = {column.name: joined(column.name) for column in _EVENT_COLUMNS}
+    arrays = {column.name: joined(column.name) for column in EVENT_COLUMNS}
     _write_arrays(path, {**arrays, 'provenance': lambda: np.array(simulated.provenance())})
 
 
 def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
     columns = {
         column.name: run.events[_FIELDS.get(column.name, column.name)]
-        for column in _EVENT_COLUMNS[1:]
+        for column in EVENT_COLUMNS[1:]
     }
     return {'run': np.full(len(run.events), run.number, dtype=np.int32), **columns}
 
