@@ -200,7 +200,7 @@ def _cycle_as_json(
         'body_rebounds': cor.body_rebounds,
         'collisions': cor.collisions,
         'tension': finite_or_none(cor.tension),
-        'quality': int(cor.quality),
+        'quality': cor.quality.names(),
         **_elements(cor, ('window_start', 'window_end', 'cooling_start')),
         **_elements(cor, _SPECIES_DECAYS),
         'relation': cor.relation.name.lower(),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nanorocks_ros.outputs.csv_tables import number
 from nanorocks_ros.outputs.table_columns import JOINED, Column
 from nanorocks_ros.records import NS, Quality
 from nanorocks_ros.wire.array_layouts import ENUMERATIONS, STAMPS, layout
@@ -123,6 +124,24 @@ def code_of(name: str, word: str) -> int:
         return int(_member(ENUMERATIONS[name], word))
     flags = () if word == GOOD else word.split(JOINED)
     return sum(int(_member(Quality, flag)) for flag in flags)
+
+
+def number_of(name: str, cell: str) -> float:
+    """The number in a cell of a table of records; of words the number that stands for them.
+
+    Tables of earlier versions hold these numbers themselves.
+
+    Raises
+    ------
+    ValueError
+        When it is neither.
+    """
+    try:
+        return number(cell)
+    except ValueError:
+        if name not in ENUMERATIONS:
+            raise
+        return float(code_of(name, cell))
 
 
 def _member(enumeration: Any, word: str) -> Any:

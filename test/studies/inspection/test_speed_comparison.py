@@ -129,7 +129,7 @@ def test_the_command_draws_one_cycle_and_writes_all_speeds(bag, bag_speeds, tmp_
         rows = list(csv.DictReader(stream))
     counts = {name: len(tray['methods'][name]['time']) for name in tray['methods']}
     assert len(rows) == sum(counts.values())
-    assert {row['method [1]'] for row in rows} == set(counts)
+    assert {row['method'] for row in rows} == set(counts)
     drawn = cv2.imread(str(picture))
     colours = {tuple(colour) for colour in drawn.reshape(-1, 3).tolist()}
     # Tracking, structure function, selected speeds.
