@@ -26,8 +26,9 @@ from nanorocks_ros.wire.array_layouts import layout
 
 print(nanorocks_ros.__file__)
 print(len(load_trays()), layout(CorEstimate).fields[0].name)
-page = resources.files('nanorocks_ros.dashboard').joinpath('page')
-print(*sorted(path.name for path in page.iterdir()))
+for name in ('page', 'film_page'):
+    page = resources.files('nanorocks_ros.dashboard').joinpath(name)
+    print(*sorted(path.name for path in page.iterdir()))
 """
 
 
@@ -120,11 +121,12 @@ def test_a_plain_installation_has_its_package_data(source_copy, tmp_path):
         timeout=300,
     )
     assert result.returncode == 0, result.stderr
-    module, data, page = result.stdout.splitlines()
+    module, data, *pages = result.stdout.splitlines()
     assert Path(module).is_relative_to(packages)
     assert data == '8 time'
-    source = ROOT / 'nanorocks_ros' / 'dashboard' / 'page'
-    assert page.split() == sorted(path.name for path in source.iterdir())
+    for page, name in zip(pages, ('page', 'film_page'), strict=True):
+        source = ROOT / 'nanorocks_ros' / 'dashboard' / name
+        assert page.split() == sorted(path.name for path in source.iterdir())
     for name in EXECUTABLES:
         assert os.access(tmp_path / 'lib' / 'nanorocks_ros' / name, os.X_OK)
 

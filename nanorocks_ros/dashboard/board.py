@@ -8,11 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.dashboard.past_cycles import PastCycles
 from nanorocks_ros.dashboard.tray_board import TrayBoard
+from nanorocks_ros.settings import DashboardSettings
+from nanorocks_ros.wire.array_layouts import layout
+from nanorocks_ros.wire.products import CURVES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from nanorocks_ros.dashboard.past_cycles import PastCycle
     from nanorocks_ros.dashboard.tray_board import Cursor
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import ArrayRecord
@@ -31,10 +36,15 @@ class Board:
     ----------
     trays : mapping of int to Tray
         For their descriptions; other trays are shown without.
+    kept_cycles : int
+        Past cycles of each tray that can be opened.
     """
 
-    def __init__(self, trays: Mapping[int, Tray]) -> None:
+    def __init__(
+        self, trays: Mapping[int, Tray], kept_cycles: int = DashboardSettings().kept_cycles
+    ) -> None:
         self._known = trays
+        self._kept_cycles = kept_cycles
         self._trays: dict[int, TrayBoard] = {}
         self._nodes: dict[str, dict[str, Any]] = {}
         self._nodes_version = 0
@@ -54,7 +64,16 @@ class Board:
     def expect(self, number: int, now_s: float) -> None:
         """Show a tray that has no results yet."""
         if number not in self._trays:
-            self._trays[number] = TrayBoard(describe(self._known.get(number)), heard_s=now_s)
+            self._trays[number] = TrayBoard(
+                describe(self._known.get(number)),
+                heard_s=now_s,
+                past=PastCycles(self._kept_cycles),
+            )
+
+    def past_cycle(self, number: int, cycle: int) -> PastCycle | None:
+        """A cycle of a tray that is over, or None where it is not kept."""
+        tray = self._trays.get(number)
+        return None if tray is None else tray.past.get(cycle)
 
     def diagnose(
         self,
@@ -103,6 +122,15 @@ class Board:
                 for name, node in sorted(self._nodes.items())
             ]
         return news
+
+
+def columns() -> dict[str, list[str]]:
+    """Names of the columns of each curve, as in the tables of `nanorocks analyse`."""
+    named = {}
+    for record, product in CURVES.items():
+        units = {field.name: field.unit for field in layout(record).fields}
+        named[product.name] = [f'{name} [{units[name]}]' for name in ('time', *product.curve)]
+    return named
 
 
 def describe(tray: Tray | None) -> str:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import json
 import logging
 import os
 import socket
 import threading
 import time
+from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros import __version__
 from nanorocks_ros.dashboard.access import Access
+from nanorocks_ros.dashboard.board import columns
 from nanorocks_ros.dashboard.clients import Client, Look, Pictures
 from nanorocks_ros.dashboard.encryption import encryption
 from nanorocks_ros.dashboard.gate import Gate, GateLimits
@@ -23,7 +27,7 @@ try:
     from aiohttp import WSMsgType, web
     from aiohttp.http_exceptions import HttpProcessingError
 
-    from nanorocks_ros.dashboard.site import make_site
+    from nanorocks_ros.dashboard.site import LIVE, make_site
 except ImportError as error:
     raise DashboardError(
         'the live page', 'needs aiohttp', "install it: pip install 'nanorocks_ros[dashboard]'"
@@ -37,6 +41,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.settings import DashboardSettings
 
+# Path of a cycle that is over.
+_CYCLE = r'/cycles/{tray:\d{1,2}}/{cycle:\d{1,9}}'
 _MOST_CLIENTS = 64
 _MOST_SAID_BYTES = 4096
 # A browser that does not answer within half of that is gone.
@@ -92,7 +98,11 @@ class PageServer:
         limits: GateLimits | None = None,
     ) -> None:
         self._settings, self._board = settings, board
-        self._greeting = {'namespace': namespace, 'version': __version__}
+        self._greeting = {
+            'namespace': namespace,
+            'version': __version__,
+            'columns': columns(),
+        }
         token = settings.token or os.environ.get(TOKEN_VARIABLE, '')
         self._encryption = encryption(settings.certificate, settings.private_key)
         encrypted = self._encryption is not None
@@ -199,7 +209,8 @@ class PageServer:
         self._loop.close()
 
     async def _open(self) -> None:
-        application = make_site(self._access, self._port, self._live, self._gate)
+        routes = [web.get(LIVE, self._live), web.get(_CYCLE, self._past_cycle)]
+        application = make_site(self._access, self._port, self._gate, routes)
         self._runner = web.AppRunner(
             application,
             access_log=None,
@@ -226,6 +237,13 @@ class PageServer:
             self._listener.close()
         if self._runner is not None:
             await self._runner.cleanup()
+
+    async def _past_cycle(self, request: web.Request) -> web.Response:
+        tray, cycle = (int(request.match_info[name]) for name in ('tray', 'cycle'))
+        past = self._board.past_cycle(tray, cycle)
+        if past is None:
+            return web.json_response({'error': 'this cycle is not kept any more'}, status=404)
+        return web.json_response(asdict(past), dumps=partial(json.dumps, allow_nan=False))
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         if len(self._clients) >= _MOST_CLIENTS:

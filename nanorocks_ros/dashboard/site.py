@@ -15,7 +15,7 @@ from aiohttp import web
 from nanorocks_ros.dashboard.gate import RequestRate, source_of
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Iterable, Mapping
 
     from nanorocks_ros.dashboard.access import Access
     from nanorocks_ros.dashboard.gate import Gate
@@ -53,7 +53,9 @@ _IN_FRONT = frozenset(('/login', '/style.css', '/icon.svg'))
 _AFTER_A_WRONG_TOKEN_S = 0.5
 
 
-def make_site(access: Access, port: int, live: Handler, gate: Gate) -> web.Application:
+def make_site(
+    access: Access, port: int, gate: Gate, routes: Iterable[web.RouteDef], folder: str = 'page'
+) -> web.Application:
     """The routes, behind the checks of who asks.
 
     Parameters
@@ -61,20 +63,23 @@ def make_site(access: Access, port: int, live: Handler, gate: Gate) -> web.Appli
     access : Access
     port : int
         Tells the cookies of two pages on one host apart.
-    live : coroutine function
-        Takes the live connection.
     gate : Gate
+    routes : iterable of RouteDef
+        Beside the page, its files and the login.
+    folder : str
+        Of the page and its files, which come before those of the live page.
     """
-    entrance = _Entrance(access, f'nanorocks_{port}')
+    files = {**_files('page'), **_files(folder)}
+    entrance = _Entrance(access, f'nanorocks_{port}', files)
     middlewares = [_timed(gate), entrance.check]
     site = web.Application(middlewares=middlewares, client_max_size=_MOST_POSTED_BYTES)
     site.on_response_prepare.append(_add_headers)
     site.router.add_get('/', entrance.page)
-    site.router.add_get(LIVE, live)
+    site.router.add_routes(routes)
     site.router.add_get('/login', entrance.ask)
     site.router.add_post('/login', entrance.log_in)
-    for name, content, kind in _files():
-        site.router.add_get(f'/{name}', _served(content, kind))
+    for name, serve in files.items():
+        site.router.add_get(f'/{name}', serve)
     return site
 
 
@@ -101,13 +106,13 @@ def _timed(gate: Gate) -> Any:
     return limit
 
 
-def _files() -> list[tuple[str, bytes, str]]:
-    folder = resources.files(__package__).joinpath('page')
-    return [
-        (path.name, path.read_bytes(), _TYPES[f'.{path.name.rpartition(".")[2]}'])
+def _files(name: str) -> dict[str, Handler]:
+    folder = resources.files(__package__).joinpath(name)
+    return {
+        path.name: _served(path.read_bytes(), _TYPES[f'.{path.name.rpartition(".")[2]}'])
         for path in folder.iterdir()
         if f'.{path.name.rpartition(".")[2]}' in _TYPES
-    ]
+    }
 
 
 def _served(content: bytes, kind: str) -> Handler:
@@ -130,9 +135,8 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
 class _Entrance:
     """Checks access and serves the login form."""
 
-    def __init__(self, access: Access, cookie: str) -> None:
+    def __init__(self, access: Access, cookie: str, files: Mapping[str, Handler]) -> None:
         self._access, self._cookie = access, cookie
-        files = {name: _served(content, kind) for name, content, kind in _files()}
         self._page, self._form = files['index.html'], files['login.html']
 
     @web.middleware

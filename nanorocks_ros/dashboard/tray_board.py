@@ -10,8 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.dashboard.curves import Series
+from nanorocks_ros.dashboard.past_cycles import PastCycles
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import (
     NS,
@@ -28,53 +30,14 @@ from nanorocks_ros.records.result_words import flags_in_words, reason_of
 from nanorocks_ros.wire.flat_records import flat_names, flat_value
 from nanorocks_ros.wire.products import CURVES
 
-Row = list[float | None]
+if TYPE_CHECKING:
+    from nanorocks_ros.dashboard.curves import Row
 
-# Points of a curve; at ten a second the longest cycle of the flight has 600.
-MOST_POINTS = 4096
 # Past cycles that are kept.
 _MOST_CYCLES = 200
 # A step back by more is a restart of the source; windows of a method overlap by less.
 _BACK_NS = NS // 2
 _NOT_SHOWN = {'stamp_ns', 'tray', 'cycle_start_ns'}
-
-
-class Series:
-    """Points of a curve in order of time; halved in number when there are too many."""
-
-    def __init__(self) -> None:
-        self.rows: list[Row] = []
-        self.generation = 0
-
-    def append(self, row: Row) -> None:
-        """Add a point."""
-        self.rows.append(row)
-        if len(self.rows) > MOST_POINTS:
-            self.rows = self.rows[:-1:2] + self.rows[-1:]
-            self.generation += 1
-
-    def cut(self, time: float) -> None:
-        """Remove the points later than a time, [s]."""
-        kept = [row for row in self.rows if row[0] is None or row[0] <= time]
-        if len(kept) < len(self.rows):
-            self.rows = kept
-            self.generation += 1
-
-    def drop_before(self, time: float) -> None:
-        """Remove the points earlier than a time, [s]."""
-        self.rows = [row for row in self.rows if row[0] is not None and row[0] >= time]
-        self.generation += 1
-
-    def since(self, end: tuple[int, int]) -> tuple[int, list[Row]]:
-        """Index of the first new point, and the new points."""
-        generation, count = end
-        first = count if generation == self.generation else 0
-        return first, self.rows[first:]
-
-    @property
-    def end(self) -> tuple[int, int]:
-        """The position of a client that has all points."""
-        return self.generation, len(self.rows)
 
 
 @dataclass
@@ -103,6 +66,7 @@ class TrayBoard:
         Rises with every record.
     heard_s : float, [s]
         Time of the last measured record; the truth does not count.
+    past : PastCycles
     """
 
     description: str
@@ -111,6 +75,7 @@ class TrayBoard:
     serial: int = 0
     version: int = 0
     heard_s: float = 0.0
+    past: PastCycles = field(default_factory=lambda: PastCycles(0))
     series: dict[str, Series] = field(default_factory=dict)
     latest: dict[str, dict[str, Any]] = field(default_factory=dict)
     finals: dict[int, list[float | None]] = field(default_factory=dict)
@@ -142,9 +107,11 @@ class TrayBoard:
             self._finish(record)
         self.heard_s = now_s
         if record.cycle > self.cycle:
+            self._keep_cycle()
             self._begin(record)
         if record.cycle < self.cycle:
-            # A late estimate of an earlier cycle: only the final one is shown.
+            # Late, of an earlier cycle.
+            self.past.amend(record.cycle, name, as_fields(record), _row(record))
             return
         self._learn_start(record)
         self._note(record)
@@ -159,16 +126,24 @@ class TrayBoard:
         self._note(truth)
 
     def _note(self, record: ArrayRecord) -> None:
-        product = CURVES[type(record)]
-        name = product.name
+        name = CURVES[type(record)].name
         self._stamps[name] = record.stamp_ns
         self.latest[name] = as_fields(record)
-        values = (_number(flat_value(record, column)) for column in product.curve)
-        self.series[name].append([_number(record.stamp_ns / NS), *values])
+        self.series[name].append(_row(record))
+
+    def _keep_cycle(self) -> None:
+        """Keep the cycle that is over, unless it is the time before the first shaking event."""
+        if self.cycle < 1:
+            return
+        rows = {name: series.rows for name, series in self.series.items()}
+        start = None if self.start_ns is None else _number(self.start_ns / NS)
+        self.past.keep(self.cycle, start, self.latest, rows)
+        self._finals_version += 1
 
     def _start_again(self, record: ArrayRecord, last_ns: int) -> None:
         """Drop the results from before the clock of the source went back from `last_ns`."""
         self.finals.clear()
+        self.past.forget()
         self._finals_version += 1
         # The truth may have gone back first, and then belongs to what begins here.
         if self._stamps.get('truth', last_ns) > (record.stamp_ns + last_ns) // 2:
@@ -232,6 +207,7 @@ class TrayBoard:
         if cursor.finals.get(number) != self._finals_version:
             cursor.finals[number] = self._finals_version
             news['finals'] = list(self.finals.values())
+            news['past'] = self.past.numbers
         for name, series in self.series.items():
             known = cursor.series.get((number, name), (0, 0))
             first, rows = series.since(known if known_serial == self.serial else (-1, 0))
@@ -264,6 +240,11 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
             record.tension, record.wall_friction, record.quality
         )
     return elements
+
+
+def _row(record: ArrayRecord) -> Row:
+    values = (_number(flat_value(record, column)) for column in CURVES[type(record)].curve)
+    return [_number(record.stamp_ns / NS), *values]
 
 
 def _number(value: float) -> float | None:

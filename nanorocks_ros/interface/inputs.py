@@ -40,6 +40,8 @@ class FilmDescription(TypedDict, total=False):
         On the floor.
     colour : str
         Name, ``#rrggbb`` or ``auto``.
+    material : str
+        Its name; "beads" where it is not told.
     density_g_cm3 : float, [g/cm^3]
         Of the beads; matters where species collide.
     corners : sequence of float, [px]
@@ -55,6 +57,7 @@ class FilmDescription(TypedDict, total=False):
     count: int | Sequence[int]
     look: str | Sequence[str]
     colour: str | Sequence[str]
+    material: str | Sequence[str]
     density_g_cm3: float | Sequence[float]
     corners: Sequence[float]
     sides_mm: tuple[float, float]
@@ -70,6 +73,7 @@ class ToldByKeywords:
     count: Sequence[int] | None = None
     look: Sequence[str] | None = None
     colour: Sequence[str] | None = None
+    material: Sequence[str] | None = None
     density_g_cm3: Sequence[float] | None = None
     corners: Sequence[float] | None = None
     sides_mm: Sequence[float] | None = None

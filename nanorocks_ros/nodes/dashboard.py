@@ -49,7 +49,7 @@ class DashboardNode(NanorocksNode):
         graph = self.parameters.declare(DashboardGraphSettings())
         self._parent = graph.parent
         self._followed: set[int] = set()
-        board = Board(load_trays(graph.trays_file))
+        board = Board(load_trays(graph.trays_file), settings.kept_cycles)
         self._server = PageServer(settings, board, self.get_namespace())
         self._images = ViewedImages(self, self._server.show, 1.0 / settings.picture_rate)
         self._server.start()

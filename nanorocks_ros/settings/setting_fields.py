@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 Scalar = bool | int | float | str
 
@@ -33,7 +32,16 @@ class Bounds:
     whole: bool = False
 
 
-def setting(default: Value, doc: str, unit: str = '', deprecated: str = '', **bounds: Any) -> Any:
+def setting(
+    default: Value,
+    doc: str,
+    unit: str = '',
+    *,
+    deprecated: str = '',
+    everyday: bool = False,
+    placeholder: str = '',
+    **bounds: Any,
+) -> Any:
     """A field of a settings class.
 
     Parameters
@@ -46,10 +54,21 @@ def setting(default: Value, doc: str, unit: str = '', deprecated: str = '', **bo
     deprecated : str
         Name of this setting in the previous release, without its group. It is accepted for one
         release, with a warning.
+    everyday : bool
+        Whether its flag is in the short help of commands.
+    placeholder : str
+        What stands for the value in the help of the flag; empty: the choices, or the unit.
     **bounds
         Fields of `Bounds`.
     """
-    metadata = {'doc': doc, 'unit': unit, 'deprecated': deprecated, 'bounds': Bounds(**bounds)}
+    metadata = {
+        'doc': doc,
+        'unit': unit,
+        'deprecated': deprecated,
+        'everyday': everyday,
+        'placeholder': placeholder,
+        'bounds': Bounds(**bounds),
+    }
     return field(default=default, metadata=metadata)
 
 
@@ -58,7 +77,8 @@ class SettingRow:
     """One setting, as the documentation, the ROS parameter and the flag need it.
 
     `name` and `deprecated`, the name in the previous release, include the group:
-    ``tracking.max_speed``. `deprecated` is empty for a setting that was not renamed.
+    ``tracking.max_speed``. `deprecated` is empty for a setting that was not renamed. Everyday
+    settings are in the short help; the placeholder is empty where choices or unit stand for it.
     """
 
     name: str
@@ -67,6 +87,8 @@ class SettingRow:
     unit: str
     bounds: Bounds
     deprecated: str = ''
+    everyday: bool = False
+    placeholder: str = ''
 
 
 def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
@@ -84,6 +106,8 @@ def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
                 unit=item.metadata['unit'],
                 bounds=item.metadata['bounds'],
                 deprecated=prefix + deprecated if deprecated else '',
+                everyday=item.metadata['everyday'],
+                placeholder=item.metadata['placeholder'],
             )
 
 
@@ -109,7 +133,7 @@ def problem(row: SettingRow, value: Any) -> str | None:
         if not isinstance(value, str):
             return f'{value!r} is not a text'
         if choices and value not in choices:
-            return f'{value!r} is none of {", ".join(choices)}'
+            return f'{value!r} is none of {", ".join(choices)}{_hint(value, choices)}'
         return None
     if isinstance(row.default, tuple):
         if isinstance(value, str):
@@ -119,6 +143,11 @@ def problem(row: SettingRow, value: Any) -> str | None:
     if isinstance(row.default, int) and isinstance(value, float) and not value.is_integer():
         return f'{value!r} is not a whole number'
     return _number_problem(value, row.bounds)
+
+
+def _hint(word: str, known: Iterable[str] | Mapping[str, str]) -> str:
+    hint = did_you_mean(word, known)
+    return f', {hint}' if hint else ''
 
 
 def _as_list(value: Any) -> list[Any]:
@@ -202,7 +231,9 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
     for message in messages:
         warnings.warn(message, FutureWarning, stacklevel=2)
     known = {row.name: row for row in rows(settings)}
-    problems = [_no_setting(name, known) for name in values if name not in known]
+    # The group may be left out.
+    near = {name.rpartition('.')[2]: name for name in known} | {name: name for name in known}
+    problems = [f'no setting {name!r}{_hint(name, near)}' for name in values if name not in known]
     for name, value in values.items():
         text = problem(known[name], value) if name in known else None
         if text:
@@ -215,15 +246,6 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
         settings, {name: coerced(known[name], value) for name, value in values.items()}
     )
     return changed
-
-
-def _no_setting(name: str, known: Mapping[str, SettingRow]) -> str:
-    """That there is no such setting, and which one may be meant."""
-    # The group may be left out.
-    by_last = {other.rpartition('.')[2]: other for other in known}
-    near = get_close_matches(name, [*known, *by_last], n=1)
-    meant = f'; did you mean {by_last.get(near[0], near[0])!r}?' if near else ''
-    return f'no setting {name!r}{meant}'
 
 
 def _replaced(settings: Any, values: Mapping[str, Value]) -> Any:

@@ -7,7 +7,7 @@ import math
 import re
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,12 @@ from nanorocks_ros.records import (
     StickingStatus,
 )
 from nanorocks_ros.wire.flat_records import flat_value, nested_fields
+from nanorocks_ros.wire.layout_fields import (
+    LayoutField,
+    array_elements,
+    exact_values,
+    rounded_elements,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -52,16 +58,9 @@ STAMPS = {
     'first_merge': 'first_merge_ns',
 }
 """Fields that a record keeps as an integer stamp, and the names of the stamps."""
-_FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
-_CONSTANT = re.compile(r'^float32\s+([A-Z]\w*)\s*=\s*(\d+)$')
-
-
-class LayoutField(NamedTuple):
-    """One element of an array: its name, unit and meaning."""
-
-    name: str
-    unit: str
-    doc: str
+_NUMBER = r'(u?int\d+|float\d+|bool)'
+_FIELD = re.compile(rf'^{_NUMBER}\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
+_CONSTANT = re.compile(rf'^{_NUMBER}\s+([A-Z]\w*)\s*=\s*(\d+)$')
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +74,7 @@ class Layout:
     doc : str
         First sentence of the definition.
     fields : tuple of LayoutField
+        The numbers of the definition.
     constants : dict of str to int
     """
 
@@ -84,9 +84,19 @@ class Layout:
     constants: dict[str, int]
 
     @property
+    def elements(self) -> tuple[LayoutField, ...]:
+        """The elements of the array: the fields, then the remainders of times."""
+        return array_elements(self.fields)
+
+    @property
+    def labels(self) -> list[str]:
+        """The names of the elements."""
+        return [element.name for element in self.elements]
+
+    @property
     def label(self) -> str:
-        """Comma-separated field names: ``layout.dim[0].label`` of the array."""
-        return ','.join(field.name for field in self.fields)
+        """The same, separated by commas: ``layout.dim[0].label`` of the array."""
+        return ','.join(self.labels)
 
 
 def layout(record_type: type[ArrayRecord]) -> Layout:
@@ -99,7 +109,7 @@ def _layout(name: str) -> Layout:
     text = resources.files(__package__).joinpath('msg', f'{name}.msg').read_text('utf-8')
     lines = [line.strip() for line in text.splitlines()]
     fields = [LayoutField(*match.groups()) for line in lines if (match := _FIELD.match(line))]
-    constants = [match.groups() for line in lines if (match := _CONSTANT.match(line))]
+    constants = [match.group(2, 3) for line in lines if (match := _CONSTANT.match(line))]
     return Layout(
         name=name,
         doc=lines[0].removeprefix('# '),
@@ -119,18 +129,44 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
     Returns
     -------
-    ndarray of float32, (n_fields,)
+    ndarray of float32, (n_elements,)
         NaN where a value is not known.
     """
-    values = [_element(record, field.name, epoch_ns) for field in layout(type(record)).fields]
-    return np.array(values, dtype=np.float32)
+    fields = layout(type(record)).fields
+    return rounded_elements(fields, (field_value(record, field, epoch_ns) for field in fields))
 
 
-def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
+def field_value(record: ArrayRecord, field: LayoutField, epoch_ns: int) -> float:
+    """The number that a record holds in a field of its layout; NaN where it is not known.
+
+    Parameters
+    ----------
+    record : any of ArrayRecord
+    field : LayoutField
+    epoch_ns : int, [ns]
+        What `time` counts from.
+    """
+    name = field.name
     value = flat_value(record, STAMPS.get(name, name))
     if value is None:
         return math.nan
     return (value - epoch_ns) / NS if name in STAMPS else float(value)
+
+
+def enumerated(record: ArrayRecord) -> dict[str, str | list[str]]:
+    """The words of the enumerations in a record, by the name of their field in typed messages.
+
+    ``status_name`` is the name of ``status`` in lower case, ``quality_names`` a list of flags.
+    """
+    words: dict[str, str | list[str]] = {}
+    for field in layout(type(record)).fields:
+        if field.name in ENUMERATIONS:
+            value = flat_value(record, field.name)
+            if isinstance(value, Quality):
+                words[f'{field.name}_names'] = value.names()
+            else:
+                words[f'{field.name}_name'] = value.name.lower()
+    return words
 
 
 def from_array(
@@ -158,17 +194,18 @@ def from_array(
     FrameError
         When the number of elements is not that of the layout or a stamp is missing.
     """
-    fields = layout(record_type).fields
-    if len(values) != len(fields):
+    fields, elements = layout(record_type).fields, layout(record_type).elements
+    if len(values) != len(elements):
         raise FrameError(
             where,
-            f'{len(values)} elements where {record_type.__name__} has {len(fields)}',
+            f'{len(values)} elements where {record_type.__name__} has {len(elements)}',
             'use the same release of nanorocks_ros on both sides',
         )
     if not math.isfinite(values[0]):
         raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
     kinds = {field.name: field.type for field in dataclasses.fields(record_type)}
-    numbers = {field.name: float(value) for field, value in zip(fields, values, strict=True)}
+    exact = exact_values(fields, values).tolist()
+    numbers = {field.name: value for field, value in zip(fields, exact, strict=True)}
     items: dict[str, Any] = {'tray': tray, **nested_fields(record_type, numbers)}
     for name, number in numbers.items():
         in_record = STAMPS.get(name, name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -31,8 +31,18 @@ class Results:
 
 @pytest.fixture(scope='session')
 def results():
-    tray = analyse(SAMPLE, PipelineSettings()).trays[1]
-    return Results(tuple(tray.speeds), tuple(tray.clusters), tuple(tray.cors))
+    analysis = analyse(SAMPLE, PipelineSettings())
+    tray = analysis.trays[1]
+    results = (tray.speeds, tray.clusters, tray.cors)
+    return Results(*(tuple(_since(analysis.epoch_ns, one) for one in some) for some in results))
+
+
+def _since(epoch_ns, record):
+    """The record with the time that the topics have, which counts from the epoch."""
+    changes = {'stamp_ns': record.stamp_ns - epoch_ns}
+    if getattr(record, 'cycle_start_ns', None) is not None:
+        changes['cycle_start_ns'] = record.cycle_start_ns - epoch_ns
+    return replace(record, **changes)
 
 
 @pytest.fixture

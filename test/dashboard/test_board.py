@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 
 from nanorocks_ros.dashboard.board import Board, clean
-from nanorocks_ros.dashboard.tray_board import MOST_POINTS, Cursor
+from nanorocks_ros.dashboard.curves import MOST_POINTS
+from nanorocks_ros.dashboard.tray_board import Cursor
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import (
     ClusterEstimate,

@@ -9,21 +9,31 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from nanorocks_ros.cli.parsing.command_parser import CommandParser
+
 
 def add_film_options(parser: argparse.ArgumentParser) -> None:
     """Add the options; each species of beads has its diameter, count and density."""
     group = parser.add_argument_group('the film, in place of a trays file')
-    several: dict[str, Any] = {'type': float, 'nargs': '+', 'metavar': 'V'}
-    group.add_argument('--diameter-px', help='diameter of the beads in the picture', **several)
-    group.add_argument('--diameter-mm', help='diameter of the beads', **several)
+    several: dict[str, Any] = {'type': float, 'nargs': '+'}
+    for unit, where in (('px', ' in the picture'), ('mm', '')):
+        group.add_argument(
+            f'--diameter-{unit}',
+            metavar=unit.upper(),
+            help=f'diameter of the beads{where}',
+            **several,
+        )
     group.add_argument('--count', type=int, nargs='+', metavar='N', help='number of beads')
     group.add_argument(
         '--look', nargs='+', metavar='LOOK', help='dark, bright or auto (default), on the floor'
     )
+    group.add_argument('--material', nargs='+', metavar='NAME', help='its name; default: beads')
     group.add_argument(
         '--colour', nargs='+', metavar='COLOUR', help='name, "#rrggbb" or auto (default)'
     )
-    group.add_argument('--density-g-cm3', help='of the beads; default 1', **several)
+    group.add_argument(
+        '--density-g-cm3', metavar='G/CM3', help='density of the beads; default 1', **several
+    )
     group.add_argument(
         '--corners',
         type=float,
@@ -42,9 +52,15 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--height-mm',
         type=float,
-        metavar='HEIGHT',
+        metavar='MM',
         help='inner height of the container, along the line of sight; the diameter for one layer',
     )
+
+
+def leave_out_film_options(parser: CommandParser) -> None:
+    """Leave the finer of the options, and what they replace, out of the short help."""
+    scale = '--preprocess-pixels-per-metre', '--preprocess-calibration'
+    parser.leave_out('--look', '--colour', '--density-g-cm3', '--corners', *scale)
 
 
 def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...]:

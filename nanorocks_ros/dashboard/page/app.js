@@ -1,10 +1,16 @@
 // What came over the live connection, on the page. Texts from outside become text, never markup.
 
+import { Alarms, alarmsOf } from './alarms.js';
 import { Cards } from './cards.js';
 import { ClusterChart, CorChart, SpeedChart } from './charts.js';
+import { CorComparison, SpeedComparison } from './compare.js';
+import { Cycles } from './cycles.js';
+import { savePicture, saveTable } from './exports.js';
 import { Link } from './link.js';
 import { Nodes } from './nodes.js';
+import { drawNumbers } from './numbers.js';
 import { Picture } from './picture.js';
+import { TimeAxis } from './time_axis.js';
 import * as words from './words.js';
 
 const SERIES = ['speed', 'cor', 'cluster', 'truth'];
@@ -16,25 +22,39 @@ const trays = new Map();
 const fromAddress = () => Number(/^#tray-(\d+)$/.exec(location.hash)?.[1]) || null;
 
 let chosen = fromAddress();
+let compared = location.hash === '#compare';
 let namespace = '';
+let columns = {};
+let linked = 'waiting';
+// The trays as they were when the page was frozen.
+let frozen = null;
 let pending = false;
 let saidAt = 0;
 let saidOf = '';
 let lookedAt = performance.now();
 
 const nodes = new Nodes(at('node-list'), at('no-nodes'), at('health'));
+const alarms = new Alarms(at('alarms'));
 const cards = new Cards(at('trays'), choose);
 const picture = new Picture(at('canvas'), at('no-picture'));
-const speeds = new SpeedChart(at('speed-chart'));
-const cors = new CorChart(at('cor-chart'));
-const clusters = new ClusterChart(at('cluster-chart'));
+const cycles = new Cycles(at('cycles'), at('finals'), () => showOther());
+const axis = new TimeAxis();
+const comparedAxis = new TimeAxis();
+const speeds = new SpeedChart(at('speed-chart'), axis);
+const cors = new CorChart(at('cor-chart'), axis);
+const clusters = new ClusterChart(at('cluster-chart'), axis);
+const comparedCors = new CorComparison(at('cor-comparison'));
+const comparedSpeeds = new SpeedComparison(at('speed-comparison'), comparedAxis);
+const charts = [speeds, cors, clusters];
 
 const link = new Link({
   greeted(said) {
     namespace = said.namespace;
+    columns = said.columns;
     at('namespace').textContent = namespace;
     at('version').textContent = `nanorocks_ros ${said.version}`;
     trays.clear();
+    cycles.close();
     nodes.forget();
   },
   step(said) {
@@ -42,12 +62,10 @@ const link = new Link({
     if (said.nodes) nodes.take(said.nodes);
     drawSoon();
   },
-  picture: (buffer) => picture.take(buffer).catch(() => {}),
+  picture: (buffer) => frozen || picture.take(buffer).catch(() => {}),
   state(state) {
+    linked = state;
     document.body.dataset.link = state;
-    const shown = at('link');
-    shown.dataset.state = { open: 'ok', lost: 'error' }[state];
-    shown.textContent = { open: 'live', lost: 'connection lost, trying again' }[state];
     drawSoon();
   },
 });
@@ -77,117 +95,78 @@ function drawSoon() {
 
 function draw() {
   if (trays.size > 0 && !trays.has(chosen)) chosen = Math.min(...trays.keys());
-  const tray = trays.get(chosen);
+  const shown = frozen ?? trays;
+  const tray = shown.get(chosen);
+  const comparing = compared && shown.size > 1;
   at('nothing').hidden = !!tray;
-  at('detail').hidden = !tray;
-  cards.draw(trays, chosen, silentFor);
+  at('comparison').hidden = !comparing;
+  at('compare').hidden = trays.size < 2;
+  at('compare').setAttribute('aria-pressed', String(comparing));
+  at('detail').hidden = !tray || comparing;
+  cards.draw(trays, comparing ? null : chosen, silentFor);
   nodes.draw();
+  const all = nodes.now();
+  alarms.draw(alarmsOf(all));
+  drawLink(all);
   look();
-  if (tray) drawTray(tray);
+  if (comparing) {
+    document.title = 'Trays compared, NanoRocks';
+    comparedCors.draw(shown);
+    comparedSpeeds.draw(shown);
+  } else if (tray) {
+    drawTray(cycles.viewOf(chosen, tray), tray);
+  }
 }
 
-function drawTray(tray) {
-  const [state, text] = words.trayState(tray, silentFor(tray));
+/** Whether results come; a node that only shows them says nothing of that. */
+function drawLink(all) {
+  const measuring = all.filter(({ name }) => !name.endsWith('/dashboard'));
+  const [state, text] = words.linkState(linked, measuring, [...trays.values()], silentFor);
+  at('link').dataset.state = state;
+  if (at('link').textContent !== text) at('link').textContent = text;
+}
+
+function drawClock() {
+  const now = new Date();
+  at('clock').textContent = now.toLocaleTimeString('en-GB');
+  at('clock').dateTime = now.toISOString();
+  at('clock').title = `${now.toISOString().slice(0, 19).replace('T', ' ')} UTC`;
+}
+
+/** A tray as it is shown, in a cycle that is over or in the one that runs now. */
+function drawTray(tray, running) {
+  const silent = frozen ? 0 : silentFor(tray);
+  const [state, text] = words.trayState(tray, silent);
   const flagged = words.flags(tray.latest).map((one) => `, ${one}`).join('');
   at('title').textContent = `Tray ${chosen}`;
   at('about').textContent = tray.description;
   at('state').dataset.state = flagged && state === 'ok' ? 'warning' : state;
-  at('state').textContent = text + flagged;
+  at('state').textContent = text + flagged + (frozen ? `, frozen at ${frozen.at}` : '');
   at('state').title = words.flagTexts(tray.latest);
   at('canvas').setAttribute('aria-label', `Picture of tray ${chosen}${pressed('tracks') ? ' with its tracks' : ''}`);
   document.title = `Tray ${chosen}, NanoRocks`;
   drawNumbers(tray);
   drawPriors(chosen);
-  speeds.draw(tray);
-  cors.draw(tray);
-  clusters.draw(tray);
-  drawFinals(tray);
+  at('picture').hidden = tray !== running;
+  if (tray !== running) at('panels').dataset.shape = 'none';
+  coverTimes(tray);
+  for (const chart of charts) chart.draw(tray);
+  cycles.draw(chosen, running);
   for (const one of document.querySelectorAll('.only-truth')) one.hidden = !tray.latest.truth;
   sayNow(tray, text.replace(/ for \d+ s$/, ''));
 }
 
-/** A number with what is to be said of it below; or only that, while there is no number. */
-function number(id, value, small) {
-  const shown = at(id);
-  const note = document.createElement('small');
-  note.textContent = small;
-  shown.classList.toggle('awaited-value', !value);
-  shown.replaceChildren(...(value ? [value, note] : [small]));
-}
-
-function drawNumbers(tray) {
-  const { cor, cluster, speed } = tray.latest;
-  drawCor(tray);
-  const wall = words.saysSomething(cor) && words.known(cor.wall_restitution);
-  number(
-    'walls',
-    wall && words.restitution(cor.wall_restitution),
-    wall ? words.interval(cor.wall_restitution_lower, cor.wall_restitution_upper, words.restitution) : 'not known yet',
-  );
-  number(
-    'speed',
-    speed && `${words.speed(speed.mean_projected_speed)} mm/s`,
-    speed ? `${words.give(speed.mean_projected_speed_error, words.speed)} by ${speed.method.replaceAll('_', ' ')}` : 'no speed yet',
-  );
-  const fitted = cor && words.known(cor.haff_time);
-  number('haff', fitted && `${cor.haff_time.toFixed(2)} s`, fitted ? words.give(cor.haff_time_error, (one) => one.toFixed(2), ' s') || 'of the fit' : 'no fit yet');
-  const size = cluster && words.known(cluster.combined_size);
-  number(
-    'cluster',
-    size && cluster.combined_size.toFixed(2),
-    size ? `beads per body ${words.give(cluster.combined_size_error, (one) => one.toFixed(2))}` : 'not known yet',
-  );
-  number('sticking', ...(cluster ? words.sticking(cluster) : ['', 'not known yet']));
-  number('drag', ...words.drag(cor));
-  number('acceleration', ...words.acceleration(cor));
-  number('exponent', ...words.exponent(cor));
+/** All plots of a tray show the same time: from its shaking event to its last result. */
+function coverTimes({ rows, start }) {
+  const curves = [rows.speed, rows.cor, rows.cluster, rows.truth].filter((some) => some.length > 0);
+  const ends = curves.flatMap((some) => [some[0][0], some[some.length - 1][0]]).map((time) => time - (start ?? 0));
+  if (ends.length) axis.cover(Math.min(...ends, ...(words.known(start) ? [0] : [])), Math.max(...ends));
 }
 
 function drawPriors(number) {
   const priors = nodes.priorsOf(number, namespace);
   at('priors').hidden = !priors;
   at('priors').textContent = priors ? `Assumed before anything is measured (priors): ${priors.replaceAll('+-', '±')}` : '';
-}
-
-const final = ([, value, lower, upper]) =>
-  words.known(value) ? `${words.restitution(value)} ${words.interval(lower, upper, words.restitution)}` : 'no estimate';
-
-function drawCor({ latest: { cor }, start, finals }) {
-  if (!words.saysSomething(cor)) {
-    const last = finals[finals.length - 1];
-    const before = last && words.known(last[1]) ? `; cycle ${last[0]}: ${final(last)}` : '';
-    const awaited = start === null ? 'no shaking event yet' : 'no estimate yet';
-    number('cor', '', (cor ? words.corState(cor) : awaited) + before);
-    return;
-  }
-  const shown = at('cor');
-  const bounds = document.createElement('span');
-  bounds.className = 'interval';
-  bounds.textContent = words.interval(cor.restitution_lower, cor.restitution_upper, words.restitution);
-  const note = document.createElement('small');
-  const contacts = cor.rebounds + cor.collisions;
-  note.textContent = words.corState(cor) + words.source(cor, contacts);
-  shown.classList.remove('awaited-value');
-  shown.replaceChildren(`${words.restitution(cor.restitution)} `, bounds, note);
-}
-
-function drawFinals(tray) {
-  at('cycles').hidden = tray.finals.length === 0;
-  const list = at('finals');
-  const texts = tray.finals.map((one) => `Cycle ${one[0]}: ${words.known(one[1]) ? 'COR ' : ''}${final(one)}`);
-  const { mean_restitution: mean, mean_restitution_error: error } = tray.latest.cor ?? {};
-  if (tray.finals.length > 1 && words.known(mean)) {
-    texts.push(`Mean: COR ${words.restitution(mean)} ${words.give(error, words.restitution)}`);
-  }
-  if (list.dataset.shown === texts.join('\n')) return;
-  list.dataset.shown = texts.join('\n');
-  list.replaceChildren(
-    ...texts.map((text) => {
-      const item = document.createElement('li');
-      item.textContent = text;
-      return item;
-    }),
-  );
 }
 
 /** For those who listen: what changed, and the estimate now and then. */
@@ -207,7 +186,7 @@ const pressed = (id) => at(id).getAttribute('aria-pressed') === 'true';
 
 /** Ask for the pictures that are shown, and for none in a window that nobody sees. */
 function look() {
-  if (document.hidden || !trays.has(chosen)) {
+  if (document.hidden || compared || frozen || cycles.opened || !trays.has(chosen)) {
     link.lookAt(null);
     return;
   }
@@ -223,10 +202,48 @@ function look() {
 function choose(tray) {
   if (!trays.has(tray)) return;
   chosen = tray;
-  lookedAt = performance.now();
+  compared = false;
+  cycles.close();
   history.replaceState(null, '', `#tray-${tray}`);
-  for (const one of [speeds, cors, clusters]) one.show(null, '');
+  showOther();
+}
+
+/** All trays beside each other, or one of them again. */
+function compare() {
+  compared = !compared;
+  history.replaceState(null, '', compared ? '#compare' : `#tray-${chosen}`);
+  showOther();
+}
+
+/** Begin with other curves: in another tray, or in another cycle. */
+function showOther() {
+  lookedAt = performance.now();
+  axis.part = null;
+  for (const chart of charts) chart.show(null, '');
   drawSoon();
+}
+
+/** What is shown stays, while measuring goes on; or it follows again. */
+function freeze() {
+  frozen = frozen ? null : structuredClone(trays);
+  if (frozen) frozen.at = new Date().toLocaleTimeString('en-GB');
+  at('freeze').setAttribute('aria-pressed', String(!!frozen));
+  document.body.dataset.frozen = frozen ? 'yes' : '';
+  drawSoon();
+}
+
+/** The part of a curve that is shown, with the columns of the tables. */
+function tableOf(name) {
+  const tray = cycles.viewOf(chosen, (frozen ?? trays).get(chosen));
+  const [low, high] = axis.shown.map((time) => time + (tray.start ?? 0));
+  return [columns[name], tray.rows[name].filter((row) => row[0] >= low && row[0] <= high)];
+}
+
+function saver(figure, chart, nameOf, table) {
+  const title = () => `${figure.querySelector('h3').textContent.replace(/\s+/g, ' ')}, ${nameOf().replaceAll('_', ' ')}`;
+  const fileOf = () => `${nameOf()}_${figure.id.replace('-chart', '').replace('-', '_')}`;
+  figure.querySelector('.csv').addEventListener('click', () => chart.plot && saveTable(fileOf(), ...table()));
+  figure.querySelector('.png').addEventListener('click', () => chart.plot && savePicture(fileOf(), title(), chart.plot));
 }
 
 function swatch(className, text) {
@@ -243,6 +260,22 @@ function drawKey() {
     ...(pressed('motion') ? [swatch('moving', 'moving')] : []),
   );
 }
+
+const trayName = () => `tray_${chosen}_cycle_${cycles.viewOf(chosen, (frozen ?? trays).get(chosen)).cycle}`;
+for (const [name, chart] of [['speed', speeds], ['cor', cors], ['cluster', clusters]]) {
+  saver(at(`${name}-chart`), chart, trayName, () => tableOf(name));
+}
+for (const [id, chart] of [['cor-comparison', comparedCors], ['speed-comparison', comparedSpeeds]]) {
+  saver(at(id), chart, () => 'trays', () => chart.table());
+}
+for (const box of document.querySelectorAll('.zoom')) {
+  const zoomed = box.dataset.of === 'compared' ? comparedAxis : axis;
+  box.querySelector('.in').addEventListener('click', () => zoomed.zoom(1 / 1.5));
+  box.querySelector('.out').addEventListener('click', () => zoomed.zoom(1.5));
+  box.querySelector('.whole').addEventListener('click', () => zoomed.reset());
+}
+at('freeze').addEventListener('click', freeze);
+at('compare').addEventListener('click', compare);
 
 for (const id of ['tracks', 'motion', 'log']) {
   at(id).addEventListener('click', () => {
@@ -264,13 +297,25 @@ document.addEventListener('keydown', (event) => {
     if (event.target.matches('.card')) document.querySelector(`.card[aria-keyshortcuts="${chosen}"]`)?.focus();
   } else if (/^[0-9]$/.test(event.key)) {
     choose(Number(event.key));
+  } else if (event.key === 'c' && trays.size > 1) {
+    compare();
+  } else if (event.key === 'f') {
+    freeze();
   }
 });
 
-window.addEventListener('hashchange', () => fromAddress() && choose(fromAddress()));
+window.addEventListener('hashchange', () => {
+  if (location.hash === '#compare') {
+    if (!compared) compare();
+  } else if (fromAddress()) choose(fromAddress());
+});
 document.addEventListener('visibilitychange', look);
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-  for (const one of [speeds, cors, clusters]) one.renew();
+  for (const chart of [...charts, comparedCors, comparedSpeeds]) chart.renew();
 });
-setInterval(drawSoon, 1000);
+setInterval(() => {
+  drawClock();
+  drawSoon();
+}, 1000);
+drawClock();
 drawKey();

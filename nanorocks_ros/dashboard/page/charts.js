@@ -1,151 +1,14 @@
-// The three curves of a tray, drawn by uPlot.
+// The three curves of a tray.
 
+import { aligned, Chart, colour, column, edge, evenly, extent, line } from './chart.js';
 import { known, restitution, roundNumbers, speed } from './words.js';
 
 const MM = 1e3;
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-/** Rows of different curves on one axis of time: one column each, null where a curve has no point. */
-function aligned(curves) {
-  const full = curves.filter((one) => one.length > 0 && one[0].length > 0);
-  if (full.length === 0) return null;
-  const data = uPlot.join(full);
-  const columns = [data[0]];
-  let next = 1;
-  for (const one of curves) {
-    const has = one.length > 0 && one[0].length > 0;
-    for (let k = 1; k < one.length; k += 1) {
-      columns.push(has ? data[next++] : data[0].map(() => null));
-    }
-  }
-  return columns;
-}
-
-const column = (rows, index, change = (value) => value) =>
-  rows.map((row) => (known(row[index]) ? change(row[index], row) : null));
-
-// A line of one point would not be seen.
-const few = (plot) => plot.data[0].length < 4;
-
-const line = (name, more = {}) => ({
-  stroke: () => colour(name),
-  width: 2,
-  spanGaps: true,
-  points: { show: few, size: 6, fill: () => colour(name) },
-  ...more,
-});
-
-const edge = { stroke: 'transparent', width: 0, spanGaps: true, points: { show: false } };
-
-/** The largest and smallest number of some columns. */
-function extent(data, columns) {
-  let low = Infinity;
-  let high = -Infinity;
-  for (const index of columns) {
-    for (const value of data[index]) {
-      if (value !== null && value !== undefined) {
-        low = Math.min(low, value);
-        high = Math.max(high, value);
-      }
-    }
-  }
-  return low <= high ? [low, high] : null;
-}
-
-/** A figure with a curve in it, its text for those who do not see it, and its empty state. */
-class Chart {
-  constructor(figure, awaited) {
-    this.box = figure.querySelector('.plot');
-    this.output = figure.querySelector('output');
-    this.note = document.createElement('p');
-    this.note.className = 'awaited';
-    this.note.textContent = awaited;
-    this.box.append(this.note);
-    this.plot = null;
-    this.data = null;
-    new ResizeObserver(() => this.plot?.setSize(this.size())).observe(this.box);
-  }
-
-  size() {
-    return { width: Math.max(160, this.box.clientWidth), height: Math.max(120, this.box.clientHeight) };
-  }
-
-  /** From the shaking event, where that is known, to the last point. */
-  span(low, high) {
-    return [this.shaken ? Math.min(0, low) : low, Math.max(high, low + 1)];
-  }
-
-  begin(tray) {
-    this.shaken = known(tray.start);
-    return tray.start ?? 0;
-  }
-
-  /** Draw; `data` is null when there is nothing to draw yet. */
-  show(data, label) {
-    this.data = data;
-    this.note.hidden = data !== null;
-    this.box.setAttribute('aria-label', data ? label : this.note.textContent);
-    if (!data) {
-      this.forget();
-      return;
-    }
-    if (this.plot) {
-      this.plot.setData(data);
-      return;
-    }
-    this.plot = new uPlot({ ...this.options(), ...this.size() }, data, this.box);
-  }
-
-  /** Draw afresh, in other colours or on another scale. */
-  renew() {
-    this.forget();
-    if (this.data) {
-      this.plot = new uPlot({ ...this.options(), ...this.size() }, this.data, this.box);
-    }
-  }
-
-  forget() {
-    this.plot?.destroy();
-    this.plot = null;
-    this.output.textContent = '';
-  }
-
-  common(y, read) {
-    const axis = {
-      stroke: () => colour('--muted'),
-      font: '12px system-ui, sans-serif',
-      grid: { stroke: () => colour('--grid'), width: 1 },
-      ticks: { show: false },
-    };
-    return {
-      legend: { show: false },
-      padding: [10, 20, 0, 0],
-      cursor: {
-        y: false,
-        drag: { x: false, y: false },
-        points: { size: 7, fill: () => colour('--panel') },
-      },
-      scales: { x: { time: false, range: (_, low, high) => this.span(low, high) }, y },
-      axes: [
-        { ...axis, size: 30, values: (_, ticks) => ticks.map((one, k) => (k === ticks.length - 1 ? `${one} s` : `${one}`)) },
-        { ...axis, size: 52 },
-      ],
-      hooks: {
-        setCursor: [
-          (plot) => {
-            const at = plot.cursor.idx;
-            this.output.textContent = known(at) ? read(plot.data, at) : '';
-          },
-        ],
-      },
-    };
-  }
-}
 
 /** Speed against time, with the law of Haff as it was fitted. */
 export class SpeedChart extends Chart {
-  constructor(figure) {
-    super(figure, 'no speed yet');
+  constructor(figure, axis) {
+    super(figure, 'no speed yet', axis);
     this.log = false;
   }
 
@@ -155,7 +18,7 @@ export class SpeedChart extends Chart {
   }
 
   draw(tray) {
-    const start = this.begin(tray);
+    const start = tray.start ?? 0;
     const time = (rows) => rows.map((row) => row[0] - start);
     const rows = tray.rows.speed;
     const positive = (value) => (value > 0 ? MM * value : null);
@@ -186,7 +49,7 @@ export class SpeedChart extends Chart {
 
   options() {
     const range = (plot) => {
-      const found = extent(plot.data, [1, 4]) ?? [0, 1];
+      const found = extent(plot, [1, 4], this.span) ?? [0, 1];
       if (this.log) return [found[0] / 1.3, found[1] * 1.3];
       return [0, found[1] * 1.08];
     };
@@ -219,12 +82,12 @@ export class SpeedChart extends Chart {
 
 /** Both restitutions as they become known. */
 export class CorChart extends Chart {
-  constructor(figure) {
-    super(figure, 'no restitution yet: it needs some seconds of cooling');
+  constructor(figure, axis) {
+    super(figure, 'no restitution yet: it needs some seconds of cooling', axis);
   }
 
   draw(tray) {
-    const start = this.begin(tray);
+    const start = tray.start ?? 0;
     const rows = tray.rows.cor.filter((row) => known(row[1]));
     const truth = tray.latest.truth;
     const times = rows.map((row) => row[0] - start);
@@ -243,8 +106,8 @@ export class CorChart extends Chart {
 
   options() {
     const range = (plot) => {
-      const [low, high] = extent(plot.data, [1, 4, 7, 8]) ?? [0, 1];
-      const wide = extent(plot.data, [2, 3, 5, 6]) ?? [low, high];
+      const [low, high] = extent(plot, [1, 4, 7, 8], this.span) ?? [0, 1];
+      const wide = extent(plot, [2, 3, 5, 6], this.span) ?? [low, high];
       // The first intervals are wide; what follows is what one looks at.
       const room = Math.max(0.03, high - low);
       return [
@@ -256,7 +119,7 @@ export class CorChart extends Chart {
       const show = (k) => restitution(data[k][at]);
       return `${data[0][at].toFixed(1)} s: ${show(1)} [${show(2)}, ${show(3)}]`;
     };
-    const values = (_, ticks) => ticks.map((one) => one.toFixed(2));
+    const values = (_, ticks) => evenly(ticks);
     const common = this.common({ range }, read);
     common.axes[1].values = values;
     const dashed = { width: 1.5, dash: [6, 5] };
@@ -276,12 +139,12 @@ export class CorChart extends Chart {
 
 /** How many beads a body has. */
 export class ClusterChart extends Chart {
-  constructor(figure) {
-    super(figure, 'no cluster size yet: it comes two seconds after the pictures');
+  constructor(figure, axis) {
+    super(figure, 'no cluster size yet: it comes two seconds after the pictures', axis);
   }
 
   draw(tray) {
-    const start = this.begin(tray);
+    const start = tray.start ?? 0;
     const rows = tray.rows.cluster.filter((row) => known(row[1]));
     this.show(
       rows.length > 1
@@ -298,7 +161,7 @@ export class ClusterChart extends Chart {
 
   options() {
     const range = (plot) => {
-      const [, high] = extent(plot.data, [1]) ?? [1, 2];
+      const [, high] = extent(plot, [1], this.span) ?? [1, 2];
       return [0.9, Math.max(2, high * 1.25)];
     };
     const read = (data, at) =>

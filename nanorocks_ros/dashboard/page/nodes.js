@@ -52,14 +52,19 @@ export class Nodes {
     return '';
   }
 
-  draw() {
+  /** The nodes with their states now. */
+  now() {
     const since = (performance.now() - this.heardAt) / 1e3;
-    const states = this.nodes.map((node) => {
+    return this.nodes.map((node) => {
       const age = node.age + since;
-      if (age > SILENT_S) return ['silent', age];
       const waiting = Number(node.values.find(([key]) => key === WAITING)?.[1]);
-      return [node.level === 'ok' && waiting >= MANY_WAITING ? 'behind' : node.level, age];
+      const behind = node.level === 'ok' && waiting >= MANY_WAITING;
+      return { ...node, age, state: age > SILENT_S ? 'silent' : behind ? 'behind' : node.level };
     });
+  }
+
+  draw() {
+    const states = this.now().map(({ state, age }) => [state, age]);
     this.nodes.forEach((node, index) => this.drawOne(node, index, ...states[index]));
     for (const [name, one] of this.shown) {
       if (!this.nodes.some((node) => node.name === name)) {

@@ -47,17 +47,17 @@ export class Picture {
     const base = this.base ?? this.layers.tracks?.bitmap ?? this.layers.tray?.bitmap;
     this.canvas.hidden = !base;
     this.note.hidden = !!base;
+    const shape = !base ? 'none' : base.width > 1.6 * base.height ? 'wide' : '';
+    document.getElementById('panels').dataset.shape = shape;
     if (!base) return;
     if (this.canvas.width !== base.width || this.canvas.height !== base.height) {
       this.canvas.width = base.width;
       this.canvas.height = base.height;
     }
-    document.getElementById('panels').dataset.shape = base.width > 1.6 * base.height ? 'wide' : '';
     const brush = this.canvas.getContext('2d');
     brush.drawImage(base, 0, 0);
     const moving = this.motion && this.fresh('motion');
     if (moving) {
-      brush.imageSmoothingEnabled = false;
       brush.drawImage(moving, 0, 0, base.width, base.height);
     }
   }

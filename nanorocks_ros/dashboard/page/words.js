@@ -122,6 +122,7 @@ export function trayState(tray, silentFor) {
   const shaken = tray.start !== null && tray.start !== undefined;
   // The truth is told whether anybody measures or not.
   const { truth: _, ...measured } = tray.latest;
+  if (tray.opened) return ['waiting', `cycle ${tray.cycle}, as it was`, 'over'];
   if (Object.keys(measured).length === 0) return ['waiting', 'nothing measured yet', 'waiting'];
   if (silentFor > 4) {
     const since = duration(silentFor);
@@ -133,4 +134,23 @@ export function trayState(tray, silentFor) {
   const last = tray.rows.speed[tray.rows.speed.length - 1];
   const since = shaken && last ? ` for ${Math.floor(last[0] - tray.start)} s` : '';
   return ['ok', `cycle ${tray.cycle}, cooling${since}`, 'cooling'];
+}
+
+const LIVE_S = 5;
+
+/**
+ * Whether results come, and what is awaited where none do.
+ *
+ * `nodes` are those that measure; `trays` those whose results are offered, `silentFor` since when they are silent.
+ */
+export function linkState(state, nodes, trays, silentFor) {
+  if (state !== 'open') return ['error', 'connection lost, trying again'];
+  if (trays.length === 0) return ['waiting', 'waiting for the pipeline'];
+  const measured = trays.filter(({ latest: { truth: _, ...results } }) => Object.keys(results).length > 0);
+  if (measured.length === 0) {
+    // A node offers its topics first, compiles, and only then tells how it is.
+    return ['waiting', nodes.length === 0 ? 'compiling, waiting for the pipeline' : 'waiting for the first results'];
+  }
+  const silent = Math.min(...measured.map(silentFor));
+  return silent < LIVE_S ? ['ok', 'live'] : ['warning', `no results for ${duration(silent)}`];
 }

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.nodes.base.problems import Level, Losses, Problem, Refusals
+from nanorocks_ros.nodes.base.problems import FRAMES_LOST, Level, Losses, Problem, Refusals
 from nanorocks_ros.records import CorEstimate, Headline, SpeedEstimate, TrayImage
 from nanorocks_ros.settings import PriorSettings, priors_in_words
 
@@ -42,8 +42,6 @@ class Diagnostics:
         Messages received, published and refused.
     values : dict of str to object
         Further values to publish, by name.
-    warning : str
-        A problem that does not stop the node; empty: none.
     watched : list of callable
         Each gives a `Problem` that the node has now, or None.
     """
@@ -56,11 +54,9 @@ class Diagnostics:
         self._last_report = (time.monotonic(), 0)
         self.counts = {'received': 0, 'published': 0, 'refused': 0}
         self.values: dict[str, object] = {}
-        self.warning = ''
         self._refusals, self._missing = Refusals(), Losses()
         self.watched: list[Callable[[], Problem | None]] = [
             self._refusals.problem,
-            self._warning,
             self._missing_frames,
         ]
 
@@ -103,9 +99,6 @@ class Diagnostics:
                 'see docs/start/doctor.md'
             )
 
-    def _warning(self) -> Problem | None:
-        return Problem(Level.WARN, self.warning) if self.warning else None
-
     def _missing_frames(self) -> Problem | None:
         rate = self._missing.rate()
         if rate == 0.0:
@@ -114,6 +107,7 @@ class Diagnostics:
             Level.WARN,
             f'{rate:.1f} frames/s are missing: lost in transport, or this machine is too slow; '
             'follow fewer trays, see docs/start/doctor.md',
+            FRAMES_LOST,
         )
 
     def _is_due(self, text: str, pause_s: float) -> bool:
@@ -162,6 +156,7 @@ class Diagnostics:
         further = {
             f'problem {number}': problem.text for number, problem in enumerate(problems[1:], 2)
         }
+        alarms = {f'alarm: {problem.alarm}': problem.text for problem in problems if problem.alarm}
         status.hardware_id = 'nanorocks'
         status.values = [
             KeyValue(key=key, value=str(value))
@@ -170,6 +165,7 @@ class Diagnostics:
                 **self._timing(),
                 **self.values,
                 **further,
+                **alarms,
             }.items()
         ]
         message = DiagnosticArray(status=[status])

@@ -5,6 +5,7 @@ Tested by ``test/nodes/base/test_problems.py``.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from enum import IntEnum
@@ -23,11 +24,23 @@ class Level(IntEnum):
 
 
 class Problem(NamedTuple):
-    """A problem that a node has now."""
+    """A problem that a node has now.
+
+    Parameters
+    ----------
+    level : Level
+    text : str
+    alarm : str
+        What the live page calls it in its alarms, such as `CAMERA_SILENT`; empty: no alarm.
+    """
 
     level: Level
     text: str
+    alarm: str = ''
 
+
+CAMERA_SILENT, NO_PUBLISHER = 'camera silent', 'no publisher'
+FRAMES_LOST, DISK_LOW, RECORDING_STOPPED = 'frames lost', 'disk low', 'recording stopped'
 
 # Refused messages are an error while they come, and a warning for some time after, [s].
 _STILL_COMES_S, _REMEMBERED_S = 2.0, 30.0
@@ -36,6 +49,11 @@ _SILENT_S = {Level.WARN: 2.0, Level.ERROR: 10.0}
 _SILENT_INTERVALS = 3.0
 # Rates are of this time, [s].
 _RATE_S = 10.0
+# A disk is low by the space on it, [bytes], or by the time until it is full, [s].
+_LEAST_FREE = {Level.ERROR: 100_000_000, Level.WARN: 1_000_000_000}
+_LEAST_LEFT_S = {Level.ERROR: 60.0, Level.WARN: 600.0}
+# How fast the disk fills is of at least this time, [s].
+_FILLING_S = 30.0
 
 
 class Refusals:
@@ -117,6 +135,7 @@ class Silence:
                     level,
                     f'{self._topic}: no frame for {silent:.0f} s although it has a publisher; is '
                     'the camera stopped, the player paused, or its quality of service another?',
+                    CAMERA_SILENT,
                 )
         return None
 
@@ -145,3 +164,50 @@ class Losses:
         while self._recent and now - self._recent[0][0] > _RATE_S:
             self._recent.popleft()
         return sum(count for _, count in self._recent) / _RATE_S
+
+
+class DiskSpace:
+    """Space on the disk of a recording.
+
+    Parameters
+    ----------
+    where : str
+        The recording.
+    clock : callable
+        Seconds on a clock that never goes back.
+    """
+
+    def __init__(self, where: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._where, self._clock = where, clock
+        self._seen: deque[tuple[float, int]] = deque()
+
+    def problem(self, free: int) -> Problem | None:
+        """A warning below 1 GB or 10 minutes, an error below 0.1 GB or one minute.
+
+        Parameters
+        ----------
+        free : int, [bytes]
+            Now.
+        """
+        left_s = self._seconds_left(free)
+        for level in (Level.ERROR, Level.WARN):
+            if free < _LEAST_FREE[level] or left_s < _LEAST_LEFT_S[level]:
+                filled = f', full in {left_s:.0f} s at this rate' if math.isfinite(left_s) else ''
+                return Problem(
+                    level,
+                    f'{self._where}: {free / 1e9:.1f} GB left on the disk{filled}; make room, or '
+                    'record elsewhere',
+                    DISK_LOW,
+                )
+        return None
+
+    def _seconds_left(self, free: int) -> float:
+        """Time until the disk is full, as it filled lately, [s]; infinite where it does not."""
+        now = self._clock()
+        self._seen.append((now, free))
+        while len(self._seen) > 2 and now - self._seen[1][0] >= _FILLING_S:
+            self._seen.popleft()
+        since, before = self._seen[0]
+        if now - since < _FILLING_S or before <= free:
+            return math.inf
+        return free * (now - since) / (before - free)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import ROSClock
 
-from nanorocks_ros.nodes.base.problems import Level, Problem
+from nanorocks_ros.nodes.base.problems import NO_PUBLISHER, Level, Problem
 from nanorocks_ros.nodes.base.qos_compatibility import mismatches
 from nanorocks_ros.nodes.base.ros_messages import node_name_of
 
@@ -93,7 +93,11 @@ class TopicMonitor:
         return [
             *(Problem(Level.ERROR, text) for text in self._wrong_types.values()),
             *(Problem(Level.WARN, text) for text in self._several.values()),
-            *([Problem(Level.WARN, f'no publisher on {", ".join(missing)}')] if missing else []),
+            *(
+                [Problem(Level.WARN, f'no publisher on {", ".join(missing)}', NO_PUBLISHER)]
+                if missing
+                else []
+            ),
         ]
 
     def _check_types(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,13 @@ from sensor_msgs.msg import CompressedImage
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
+from nanorocks_ros.nodes.base.problems import (
+    FRAMES_LOST,
+    RECORDING_STOPPED,
+    DiskSpace,
+    Level,
+    Problem,
+)
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.reader import BagMessage
 from nanorocks_ros.recordings.bag.recorder import Recorder
@@ -66,8 +74,12 @@ class GraphRecorder:
         self._wait_for_disk = wait_for_disk
         self._epoch_ns: int | None = None
         self._reported_drops = 0
-        self._failed = False
+        # What ended the recording before its time.
+        self._failed = ''
+        self._ended = False
         self._path = settings.record
+        self._disk = DiskSpace(self._path)
+        node.diagnostics.watched += [self._disk_low, self._lost_frames, self._stopped]
         by_name = {
             topic.absolute(tray): offered_topic(topic) for topic in topics.TOPICS for tray in trays
         }
@@ -116,6 +128,7 @@ class GraphRecorder:
 
     def close(self) -> None:
         """Write what waits, and the index of the bag."""
+        self._ended = True
         self._recorder.close()
         self._report()
 
@@ -126,23 +139,43 @@ class GraphRecorder:
         diagnostics.values['frames not recorded'] = recorder.dropped
         if recorder.dropped > self._reported_drops:
             self._reported_drops = recorder.dropped
-            diagnostics.warning = (
-                f'{self._path}: the disk is too slow; {recorder.dropped} frames are not recorded '
-                'so far, all results are'
-            )
             self._node.get_logger().warning(
-                diagnostics.warning, throttle_duration_sec=_REPEAT_WARNING_S
+                self._too_slow(), throttle_duration_sec=_REPEAT_WARNING_S
             )
         if recorder.problem is not None and not self._failed:
-            self._failed = True
             self._node.exit_code = 1
             if not isinstance(recorder.problem, NanorocksError):
                 raise recorder.problem
-            diagnostics.warning = (
+            self._failed = (
                 f'{recorder.problem}; the recording ended, the bag stays readable up to here, '
                 'the graph continues'
             )
-            self._node.get_logger().error(diagnostics.warning)
+            self._node.get_logger().error(self._failed)
+
+    def _too_slow(self) -> str:
+        return (
+            f'{self._path}: the disk is too slow; {self._recorder.dropped} frames are not '
+            'recorded so far, all results are'
+        )
+
+    def _lost_frames(self) -> Problem | None:
+        if not self._recorder.dropped or self._failed:
+            return None
+        return Problem(Level.WARN, self._too_slow(), FRAMES_LOST)
+
+    def _stopped(self) -> Problem | None:
+        return Problem(Level.ERROR, self._failed, RECORDING_STOPPED) if self._failed else None
+
+    def _disk_low(self) -> Problem | None:
+        if self._failed or self._ended:
+            return None
+        try:
+            free = shutil.disk_usage(self._path).free
+        except OSError:
+            # The recorder tells what is wrong with the folder.
+            return None
+        self._node.diagnostics.values['disk left [GB]'] = f'{free / 1e9:.1f}'
+        return self._disk.problem(free)
 
 
 def provenance(source: str, *settings: Any) -> dict[str, str]:

@@ -118,8 +118,8 @@ def write_results(
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
             _write_tables(analysis, fresh, source, settings, form)
-            metadata = _bag_provenance(source, settings) | _truth(analysis)
-            _write_bag(analysis, fresh / BAG_NAME, metadata)
+            provenance = _bag_provenance(source, settings) | _truth(analysis)
+            _write_bag(analysis, fresh / BAG_NAME, provenance)
             if more is not None:
                 more(fresh)
             if folder.exists():
@@ -220,7 +220,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
         for name, record in heapq.merge(*streams, key=lambda item: item[1].stamp_ns):
             values = to_array(record, analysis.epoch_ns)
-            labels = [field.name for field in layout(type(record)).fields]
+            labels = layout(type(record)).labels
             bag.write(name, record.stamp_ns, float_array_message(labels, values))
 
 

@@ -42,6 +42,11 @@ if TYPE_CHECKING:
 _MM = 1e3
 # Place of a section after restitutions, clusters and figures.
 _AFTER_FIGURES = 3
+_SOURCES = {
+    'joint': ', by decays and contacts together',
+    'contacts': ', by contacts alone',
+    'decay': ', by decays alone',
+}
 _SHORTEST_DAY = 86_400 * 365
 
 
@@ -103,7 +108,7 @@ def _conclusions(together: Combined) -> list[str]:
     for tray in _known(together):
         values = means_as_json(tray)
         beads, walls = (_interval(values, f'{kind}restitution') for kind in ('', 'wall_'))
-        source = f', by {values["headline"]}' if values['headline'] else ''
+        source = _SOURCES.get(values['headline'] or '', '')
         lines.append(
             f'Tray {tray.tray}: restitution of the beads {beads}, of the walls {walls}, from '
             f'{counted(tray.cycles, "cycle")}{source}.'

@@ -6,7 +6,9 @@ What is not told is guessed, and a notice says what was guessed.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +16,15 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.appearance import AUTO
 from nanorocks_ros.experiment.film_section import FilmSection
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 # A bead of unknown size counts as one of the flight: the constants of the stages suit it.
 _NOMINAL_DIAMETER = 2e-3
 # Largest difference of the scales along both sides, relative.
 _MAX_SKEW = 0.03
 _MM = 1e3
+_NAME = re.compile(r'[A-Za-z][\w-]{0,39}')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +39,8 @@ class FilmedBeads:
     density : float or None, [g/cm^3]
     look, colour : str
         As ``look:`` and ``colour:`` of a trays file.
+    material : str
+        Its name; empty: ``beads``, with a number where there are several species.
     """
 
     diameter_px: float
@@ -41,6 +49,7 @@ class FilmedBeads:
     density: float | None = None
     look: str = AUTO
     colour: str = AUTO
+    material: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +128,8 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
 def _guesses(filmed: FilmedTray, largest: float) -> list[str]:
     """What is assumed beside the scale, a line each."""
     notices = []
+    if filmed.sides is not None and not filmed.corners_px:
+        notices.append('the sides of the container are of no use without --corners')
     if filmed.height is None:
         notices.append(
             'the height of the container is not told; one layer of beads is assumed, '
@@ -181,11 +192,35 @@ def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float
     )
 
 
+def _names(species: Sequence[FilmedBeads]) -> list[str]:
+    """Names of the materials in the trays file.
+
+    Raises
+    ------
+    ConfigurationError
+        For a name that is no word, or that two species have.
+    """
+    several = len(species) > 1
+    names = [
+        beads.material or (f'beads_{number}' if several else 'beads')
+        for number, beads in enumerate(species, start=1)
+    ]
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise ConfigurationError(
+                '--material',
+                f'{name[:60]!r} is no name',
+                'give letters, digits, _ and -, up to 40',
+            )
+        if names.count(name) > 1:
+            raise ConfigurationError('--material', f'{name} is named twice', 'name them apart')
+    return names
+
+
 def _text(filmed: FilmedTray, section: FilmSection, sides: tuple[float, float, float]) -> str:
     """The trays file."""
     materials, species = [], []
-    for number, beads in enumerate(filmed.beads, start=1):
-        name = f'beads_{number}' if len(filmed.beads) > 1 else 'beads'
+    for name, beads in zip(_names(filmed.beads), filmed.beads, strict=True):
         density = 1.0 if beads.density is None else beads.density
         materials.append(f'  {name}: {{density_g_cm3: {density:g}, color_bgr: [90, 90, 90]}}\n')
         count = '' if beads.count is None else f', count: {beads.count}'

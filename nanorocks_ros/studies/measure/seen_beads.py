@@ -36,11 +36,14 @@ class SeenBeads(NamedTuple):
         Share of the frames with exactly that number.
     picture : ndarray of uint8, (rows, columns, 3), bgr
         The middle frame: the tray framed, beads in rings.
+    discs : tuple of tuples of ndarray, (n_beads, 3), [px]
+        Of each frame, by species: column and row of the centre, and radius.
     """
 
     counts: tuple[float, ...]
     steady: tuple[float, ...]
     picture: NDArray[np.uint8]
+    discs: tuple[tuple[NDArray[np.float64], ...], ...]
 
 
 def guessed_diameter(frames: Sequence[NDArray[np.uint8]]) -> float:
@@ -116,18 +119,22 @@ def seen_beads(text: str, frames: Sequence[NDArray[np.uint8]]) -> SeenBeads:
     ]
     detector = SceneDetector(tray, section.pixels_per_metre)
     detector.learn(crops)
-    numbers, shown = [], frames[len(frames) // 2].copy()
-    for k, crop in enumerate(crops):
-        detections = detector.detect(crop)
-        numbers.append([beads.radii.size for beads in detections])
-        if k == len(crops) // 2:
-            for species, beads in enumerate(detections):
-                _draw(shown, beads.positions + np.array([column, row]), beads.radii, species)
+    corner = np.array([column, row])
+    discs = [
+        tuple(
+            np.column_stack([beads.positions + corner, beads.radii])
+            for beads in detector.detect(crop)
+        )
+        for crop in crops
+    ]
+    shown = frames[len(frames) // 2].copy()
+    for species, beads in enumerate(discs[len(frames) // 2]):
+        _draw(shown, beads[:, :2], beads[:, 2], species)
     cv2.rectangle(shown, (column, row), (column + width, row + height), _REGION, 2)
-    table = np.array(numbers)
+    table = np.array([[len(beads) for beads in frame] for frame in discs])
     counts = np.median(table, axis=0)
     steady = (table == counts).mean(axis=0)
-    return SeenBeads(tuple(counts.tolist()), tuple(steady.tolist()), shown)
+    return SeenBeads(tuple(counts.tolist()), tuple(steady.tolist()), shown, tuple(discs))
 
 
 def _draw(

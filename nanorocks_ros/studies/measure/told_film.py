@@ -33,6 +33,7 @@ class ToldFilm(Protocol):
     count: Sequence[int] | None
     look: Sequence[str] | None
     colour: Sequence[str] | None
+    material: Sequence[str] | None
     density_g_cm3: Sequence[float] | None
     corners: Sequence[float] | None
     sides_mm: Sequence[float] | None
@@ -94,6 +95,7 @@ def _beads(told: ToldFilm, k: int) -> FilmedBeads:
         density=value(told.density_g_cm3),
         look=value(told.look) or AUTO,
         colour=value(told.colour) or AUTO,
+        material=value(told.material) or '',
     )
 
 
@@ -104,7 +106,7 @@ def _check(told: ToldFilm) -> None:
         '--count': told.count,
         '--density-g-cm3': told.density_g_cm3,
     }
-    words = {'--look': told.look, '--colour': told.colour}
+    words = {'--look': told.look, '--colour': told.colour, '--material': told.material}
     single = [] if told.height_mm is None else [told.height_mm]
     positive = {**lists, '--sides-mm': told.sides_mm, '--height-mm': single}
     for flag, values in positive.items():

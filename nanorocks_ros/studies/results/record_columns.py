@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.outputs.table_columns import Kind
     from nanorocks_ros.records import ArrayRecord
-    from nanorocks_ros.wire.array_layouts import LayoutField
+    from nanorocks_ros.wire.layout_fields import LayoutField
 
 GOOD = 'good'
 """Stands for no flag at all: an empty cell would be "not known"."""

@@ -121,5 +121,5 @@ def test_a_tray_too_dense_for_the_theory_names_the_alternative(tmp_path, capsys)
         'trays: {1: {dimensions_mm: [15, 15, 3], '
         'species: [{material: acrylic, diameter_mm: 2, count: 60}]}}\n'
     )
-    assert draw('instantaneous', table, tmp_path / 'a.png', '--trays', str(trays)) == 2
+    assert draw('instantaneous', table, tmp_path / 'a.png', '--trays-file', str(trays)) == 2
     assert 'use the decay library' in capsys.readouterr().err

@@ -9,7 +9,10 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.nodes.base.problems import DISK_LOW, Level, Problem
 from nanorocks_ros.settings import PriorSettings
+
+FULL = Problem(Level.WARN, 'the disk is full', DISK_LOW)
 
 
 @pytest.fixture
@@ -65,12 +68,14 @@ def test_alike_refusals_of_every_frame_are_logged_once(own_node, capfd):
 def test_further_problems_stand_among_the_values(report):
     node, next_status = report
     node.topic_monitor.require_publisher('/nowhere')
-    node.diagnostics.warning = 'the disk is full'
+    node.diagnostics.watched.append(lambda: FULL)
     node.diagnostics.process(refuse, None)
     status, values = next_status()
     assert status.level == DiagnosticStatus.ERROR
     assert values['problem 2'] == 'the disk is full'
     assert values['problem 3'] == 'no publisher on /nowhere'
+    assert values['alarm: disk low'] == 'the disk is full'
+    assert values['alarm: no publisher'] == 'no publisher on /nowhere'
 
 
 def test_a_warning_and_a_missing_publisher_are_shown_in_this_order(report):
@@ -78,7 +83,7 @@ def test_a_warning_and_a_missing_publisher_are_shown_in_this_order(report):
     node.topic_monitor.require_publisher('/nowhere')
     status, _ = next_status()
     assert (status.level, status.message) == (DiagnosticStatus.WARN, 'no publisher on /nowhere')
-    node.diagnostics.warning = 'the disk is full'
+    node.diagnostics.watched.append(lambda: FULL)
     status, _ = next_status()
     assert (status.level, status.message) == (DiagnosticStatus.WARN, 'the disk is full')
 

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from nanorocks_ros.nodes.base.problems import Level, Losses, Refusals, Silence
+from nanorocks_ros.nodes.base.problems import DiskSpace, Level, Losses, Problem, Refusals, Silence
 
 
 class Clock:
@@ -29,7 +29,7 @@ def test_refusals_are_an_error_then_a_warning_then_over(clock):
     assert refusals.problem() is None
     refusals.add('too dark')
     refusals.add('too bright')
-    assert refusals.problem() == (Level.ERROR, 'too bright')
+    assert refusals.problem() == Problem(Level.ERROR, 'too bright')
     clock.now += 10.0
     later = refusals.problem()
     assert later.level is Level.WARN
@@ -82,3 +82,27 @@ def test_losses_are_a_rate_of_the_last_ten_seconds(clock):
     assert losses.rate() == pytest.approx(0.5)
     clock.now += 10.0
     assert losses.rate() == 0.0
+
+
+def test_a_disk_is_low_by_its_space_and_by_the_time_until_it_is_full(clock):
+    disk = DiskSpace('bags/run', clock)
+    assert disk.problem(50_000_000_000) is None
+    assert disk.problem(900_000_000).level is Level.WARN
+    assert disk.problem(90_000_000).level is Level.ERROR
+    filling = DiskSpace('bags/run', clock)
+    assert filling.problem(40_000_000_000) is None
+    clock.now += 30.0
+    problem = filling.problem(20_000_000_000)
+    assert (problem.level, problem.alarm) == (Level.ERROR, 'disk low')
+    assert problem.text.startswith(
+        'bags/run: 20.0 GB left on the disk, full in 30 s at this rate;'
+    )
+    clock.now += 30.0
+    assert filling.problem(20_000_000_000) is None
+
+
+def test_a_disk_of_which_others_free_space_is_not_low(clock):
+    disk = DiskSpace('bags/run', clock)
+    for free in (20_000_000_000, 30_000_000_000, 40_000_000_000):
+        assert disk.problem(free) is None
+        clock.now += 40.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import signal
 import time
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Float32MultiArray
 
 from nanorocks_ros.nodes.base.ros_messages import qos_of
@@ -85,6 +87,30 @@ def test_after_a_kill_all_results_older_than_two_seconds_are_readable(graph, tmp
     # Of each truth there was a frame.
     seconds = (bag.end_ns - bag.start_ns) / 1e9
     assert abs(bag.topics[CAMERA].count - 30 * seconds) <= 3
+
+
+def test_a_recording_that_ends_before_its_time_is_an_alarm(graph, tmp_path):
+    told = []
+    graph.node.create_subscription(
+        DiagnosticArray,
+        '/diagnostics',
+        lambda message: told.extend(
+            (status.level, {pair.key: pair.value for pair in status.values})
+            for status in message.status
+        ),
+        10,
+    )
+    path = tmp_path / 'bag'
+    process = graph.start('pipeline', *SMALL, f'record:={path}')
+    graph.until(lambda: any(float(values.get('disk left [GB]', 0)) > 0 for _, values in told))
+    # No file may become larger: as if the disk were full.
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
+    graph.until(lambda: any('alarm: recording stopped' in values for _, values in told))
+    level, values = told[-1]
+    assert level == DiagnosticStatus.ERROR
+    assert values['alarm: recording stopped'].startswith(str(path))
+    assert 'the graph continues' in values['alarm: recording stopped']
+    assert list(open_bag(path).messages([topics.SPEED.absolute(1)]))
 
 
 @pytest.mark.parametrize(

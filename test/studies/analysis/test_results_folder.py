@@ -104,7 +104,7 @@ def full_analysis():
     analysed = analysis()
     for product in MEASURED:
         if not analysed.trays[5].of(product.record):
-            values = np.ones(len(layout(product.record).fields))
+            values = np.ones(len(layout(product.record).elements))
             analysed.trays[5].add(
                 from_array(product.record, values, tray=5, epoch_ns=0, where='test')
             )

@@ -6,7 +6,7 @@ import argparse
 
 import pytest
 
-from nanorocks_ros.cli.main import COMMANDS, build_parser
+from nanorocks_ros.cli.main import build_parser
 from nanorocks_ros.tools.docs_pages.command_pages import (
     command_line_page,
     commands_of,
@@ -25,8 +25,9 @@ def sections(page):
 
 
 def test_every_command_has_a_section(page):
-    named = {name.split()[1] for name in sections(page) if name.startswith('nanorocks ')}
-    assert named == set(COMMANDS)
+    named = {name for name in sections(page) if name.startswith('nanorocks ')}
+    assert named == {command.name for command in commands_of(build_parser())}
+    assert len(named) > 20
     assert 'nanorocks figure packing' in sections(page)
 
 

@@ -1,0 +1,111 @@
+// What is marked in a frame: the corners of the container and a circle over a bead of each species.
+
+export const RINGS = ['#22c55e', '#f97316', '#c084fc', '#06b6d4', '#eab308', '#ec4899'];
+const REACH_PX = 16;
+const EDGE_PX = 9;
+const SMALLEST = 3;
+
+/** The corners of the box around some points, from the upper left one on. */
+export function boxAround(points) {
+  const [xs, ys] = [0, 1].map((axis) => points.map((point) => point[axis]));
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+}
+
+const cornersOf = ([left, top, right, bottom]) => [[left, top], [right, top], [right, bottom], [left, bottom]];
+const distance = ([a, b], [x, y]) => Math.hypot(a - x, b - y);
+
+export class Marks {
+  /** `changed` is called when somebody has marked something else. */
+  constructor(width, height, changed) {
+    Object.assign(this, { width, height, changed });
+    this.corners = cornersOf([0, 0, width, height]);
+    this.cornersTold = false;
+    this.clicking = null;
+    this.held = null;
+  }
+
+  setBox(box) {
+    this.corners = cornersOf(box);
+    this.cornersTold = true;
+  }
+
+  wholePicture() {
+    this.corners = cornersOf([0, 0, this.width, this.height]);
+    this.cornersTold = false;
+    this.clicking = null;
+  }
+
+  /** What is under a pointer; `reach` is a pixel of the screen in pixels of the film. */
+  under(place, species, reach, beads) {
+    for (const [k, corner] of this.corners.entries()) {
+      if (distance(corner, place) < REACH_PX * reach) return { corner: k };
+    }
+    if (!beads) return null;
+    for (const [k, { bead }] of species.entries()) {
+      if (!bead) continue;
+      const off = distance(bead, place);
+      if (Math.abs(off - bead[2] / 2) < EDGE_PX * reach && off > bead[2] / 4) return { edge: k };
+      if (off < bead[2] / 2) return { circle: k, from: [place[0] - bead[0], place[1] - bead[1]] };
+    }
+    return null;
+  }
+
+  /** A click where a corner is awaited; whether it was taken. */
+  click(place) {
+    if (!this.clicking) return false;
+    this.clicking.push(place.map((value) => Math.round(value)));
+    if (this.clicking.length === 4) {
+      this.setBox(boxAround(this.clicking));
+      this.clicking = null;
+      this.changed();
+    }
+    return true;
+  }
+
+  drag(place, species) {
+    const { corner, edge, circle, from } = this.held;
+    const inside = [Math.min(Math.max(place[0], 0), this.width), Math.min(Math.max(place[1], 0), this.height)];
+    if (corner !== undefined) {
+      // The container is upright in the picture: the corner opposite stays, the others follow.
+      const moved = inside.map((value) => Math.round(value));
+      const opposite = this.corners[(corner + 2) % 4];
+      this.setBox(boxAround([moved, opposite]));
+      this.held.corner = this.corners.findIndex(([x, y]) => x === moved[0] && y === moved[1]);
+    } else if (edge !== undefined) {
+      const { bead } = species[edge];
+      bead[2] = Math.max(SMALLEST, Math.round(20 * distance(bead, place)) / 10);
+      species[edge].marked = true;
+    } else {
+      const { bead } = species[circle];
+      bead[0] = Math.round(10 * Math.min(Math.max(inside[0] - from[0], 0), this.width - 1)) / 10;
+      bead[1] = Math.round(10 * Math.min(Math.max(inside[1] - from[1], 0), this.height - 1)) / 10;
+      species[circle].marked = true;
+    }
+  }
+
+  draw(brush, species, scale, beads) {
+    brush.lineWidth = 2 * scale;
+    brush.strokeStyle = '#ffc800';
+    brush.fillStyle = '#ffc800';
+    brush.setLineDash(this.cornersTold ? [] : [6 * scale, 5 * scale]);
+    const [left, top, right, bottom] = boxAround(this.corners);
+    brush.strokeRect(left, top, right - left, bottom - top);
+    brush.setLineDash([]);
+    for (const [x, y] of this.clicking ?? this.corners) {
+      brush.beginPath();
+      brush.arc(x, y, 6 * scale, 0, 2 * Math.PI);
+      brush.fill();
+    }
+    if (!beads) return;
+    species.forEach(({ bead }, k) => {
+      if (!bead) return;
+      for (const [colour, width] of [['#000000', 6], [RINGS[k], 3.5]]) {
+        brush.strokeStyle = colour;
+        brush.lineWidth = width * scale;
+        brush.beginPath();
+        brush.arc(bead[0], bead[1], bead[2] / 2, 0, 2 * Math.PI);
+        brush.stroke();
+      }
+    });
+  }
+}

@@ -1,0 +1,39 @@
+// What is drawn, as a table (CSV) or as a picture (PNG), for the folder of downloads.
+
+const MARGIN = 12;
+const TITLE = 22;
+
+function save(blob, name) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
+const cell = (value) => (value === null || value === undefined ? 'nan' : String(value));
+
+/** A table as `nanorocks analyse` writes them: names with units in the first line. */
+export function saveTable(name, columns, rows) {
+  const lines = [columns, ...rows.map((row) => row.map(cell))].map((row) => row.join(','));
+  save(new Blob([`${lines.join('\n')}\n`], { type: 'text/csv' }), `${name}.csv`);
+}
+
+/** The plot as it is seen, with its title above it. */
+export function savePicture(name, title, plot) {
+  const style = getComputedStyle(document.documentElement);
+  const colour = (of) => style.getPropertyValue(of).trim();
+  const { canvas } = plot.ctx;
+  const scale = devicePixelRatio || 1;
+  const picture = document.createElement('canvas');
+  picture.width = canvas.width + 2 * MARGIN * scale;
+  picture.height = canvas.height + (2 * MARGIN + TITLE) * scale;
+  const brush = picture.getContext('2d');
+  brush.fillStyle = colour('--panel');
+  brush.fillRect(0, 0, picture.width, picture.height);
+  brush.fillStyle = colour('--text');
+  brush.font = `600 ${14 * scale}px system-ui, sans-serif`;
+  brush.fillText(title, MARGIN * scale, (MARGIN + 13) * scale);
+  brush.drawImage(canvas, MARGIN * scale, (MARGIN + TITLE) * scale);
+  picture.toBlob((blob) => save(blob, `${name}.png`), 'image/png');
+}
