@@ -27,7 +27,7 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-oldest golden lint bench docs venv messages lock clean
+.PHONY: help demo test test-oldest golden lint bench docs docs-pages site venv messages lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -53,7 +53,8 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/studies/reproduction test/studies/batch test/studies/calibration \
         test/studies/libraries test/studies/sweeps test/cli/simulation/test_sweep.py \
         test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py \
-        test/test_contributing.py
+        test/test_contributing.py test/test_docs_code.py test/test_printed_numbers.py \
+        test/test_tutorial.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
@@ -72,9 +73,14 @@ lint: venv ## Check style, format, types and which module may import which
 bench: venv ## Measure against the limits and against peers
 	@$(RUN) python -m benchmarks
 
-docs: venv ## Renew the pages of docs/ that are made from the code
+docs: docs-pages site ## Renew the generated pages of docs/, and build the site
+
+docs-pages: venv ## Renew the pages of docs/ that are made from the code (minutes)
 	@$(RUN) python -m nanorocks_ros.tools.docs_pages.wire_pages
 	@$(RUN) python -m nanorocks_ros.nodes.reference
+
+site: venv ## Build the documentation into build/site, with search
+	@$(RUN) python -m nanorocks_ros.tools.docs_pages.site
 
 venv: ## Set up the environment that all of these use
 	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \

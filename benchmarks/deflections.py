@@ -43,7 +43,7 @@ def report() -> None:
     """Print the table."""
     shots = _shots()
     print(
-        '| tray, species | collisions per diameter of path | kinks: true, tracks | '
+        '| tray, species | collisions per diameter of path | velocity jumps: true, tracks | '
         'path lost per diameter: true, tracks |\n| --- | --- | --- | --- |'
     )
     trays = load_trays()

@@ -61,27 +61,27 @@ def _temperature_ratios(measured: TrayStatistics, tracks: list) -> tuple[list, l
         )
         spans = zip(part.time, part.duration, strict=True)
         means = np.array([true[np.abs(times - t) <= 0.5 * d + 1e-3].mean() for t, d in spans])
-        measured = part.temperature.mean(axis=1)
-        ratios += (measured / means).tolist()
-        sigmas += ((measured - means) / part.temperature_error).tolist()
+        temperature = part.temperature.mean(axis=1)
+        ratios += (temperature / means).tolist()
+        sigmas += ((temperature - means) / part.temperature_error).tolist()
     return ratios, sigmas
 
 
 def _collision_ratio(measured: TrayStatistics, tracks: list, pairs: np.ndarray) -> tuple:
     """Measured over counted collisions, its error, and theory over counted ones."""
     first = round(_START * _RATE)
-    measured, variance, theory = 0.0, 0.0, 0.0
+    collisions, variance, theory = 0.0, 0.0, 0.0
     for kind, rate in enumerate(measured.collisions):
         speeds = [
             np.hypot(*record.velocities[record.species == kind].T).mean()
             for record in tracks[first:]
         ]
         path = 0.5 * measured.tray.species[kind].count * np.sum(speeds) / _RATE
-        measured += rate.per_path.value * path
+        collisions += rate.per_path.value * path
         variance += (rate.per_path.error * path) ** 2
         theory += rate.theory_per_path * path
     true = pairs[-1] - pairs[first]
-    return measured / true, np.sqrt(variance) / true, theory / true
+    return collisions / true, np.sqrt(variance) / true, theory / true
 
 
 def report() -> None:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from pathlib import Path
 
 import pytest
+from page_code import PAGES, ROOT
 
 from nanorocks_ros import records
 
-ROOT = Path(__file__).resolve().parent.parent
-PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md'), ROOT / 'bags/README.md'])
 SUFFIXES = r'(_error|_errors|_lower|_upper|_68|_[xy]|_[12])*$'
 LINK = re.compile(r'(?<!`)\[[^\]]*\]\(([^)\s]+)\)')
 
@@ -90,9 +88,3 @@ def test_pages_that_code_names_exist():
         if not (ROOT / name).exists()
     }
     assert missing == set()
-
-
-def test_every_picture_is_on_a_page():
-    text = '\n'.join(page.read_text(encoding='utf-8') for page in PAGES)
-    pictures = {path.name for path in (ROOT / 'docs/pictures').iterdir()}
-    assert {name for name in pictures if f'pictures/{name})' not in text} == set()

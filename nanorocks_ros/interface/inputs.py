@@ -33,7 +33,9 @@ class FilmDescription(TypedDict, total=False):
     diameter_px : float, [px]
         Of the beads in the picture; needed.
     diameter_mm : float, [mm]
+        Of the beads; gives the scale.
     count : int
+        Number of beads; the decay needs it.
     look : 'auto', 'bright' or 'dark'
         On the floor.
     colour : str
@@ -41,6 +43,7 @@ class FilmDescription(TypedDict, total=False):
     material : str
         Its name; "beads" where it is not told.
     density_g_cm3 : float, [g/cm^3]
+        Of the beads; matters where species collide.
     corners : sequence of float, [px]
         Column and row of two opposite corners of the container, or of all four.
     sides_mm : tuple of 2 floats, [mm]

@@ -149,7 +149,7 @@ def _interval(value: RestitutionOfContacts) -> str:
 def _speeds(tray: MeasuredTray) -> pd.DataFrame:
     frame = pd.DataFrame(dict(zip(_SPEED_UNITS, tray.speeds, strict=True)))
     frame.attrs['units'] = dict(_SPEED_UNITS)
-    return with_column(frame, 0, 'tray', tray.number)
+    return with_column(frame, 0, 'tray', tray.number, '1')
 
 
 def _cor(tray: MeasuredTray) -> pd.DataFrame:

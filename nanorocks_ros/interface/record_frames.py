@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.parquet import Column
+    from nanorocks_ros.outputs.table_columns import Column
     from nanorocks_ros.records import ArrayRecord
 
 # Metres at the start of a unit, with a power.
@@ -73,7 +73,7 @@ def joined(frames: Iterable[pd.DataFrame], **attributes: Any) -> pd.DataFrame:
 
 
 def with_column(
-    frame: pd.DataFrame, place: int, name: str, value: Any, unit: str = '1'
+    frame: pd.DataFrame, place: int, name: str, value: Any, unit: str = ''
 ) -> pd.DataFrame:
     """The frame with a column more, at a place."""
     units = frame.attrs.get('units', {})
@@ -122,5 +122,5 @@ def table_frame(
             for column in columns
         }
     )
-    frame.attrs['units'] = {column.name: column.unit or '1' for column in columns}
+    frame.attrs['units'] = {column.name: column.unit for column in columns}
     return frame

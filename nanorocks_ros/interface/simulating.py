@@ -50,6 +50,7 @@ def simulate(
     duration : float, [s]
         After the shaking event; a film begins ``first_shake`` before it.
     runs : int
+        Their number.
     times : int, optional
         Number of evenly spaced times of curves and tracks; default: one for each frame, at most
         301.

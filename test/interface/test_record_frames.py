@@ -51,7 +51,7 @@ def test_joined_frames_keep_units_and_kinds():
     whole = joined([with_column(part, 0, 'recording', 'a') for part in parts], probability=0.95)
     assert whole['time'].tolist() == [1.0, 2.0]
     assert whole['cycle'].dtype == np.int64
-    assert whole.attrs['units']['recording'] == '1'
+    assert whole.attrs['units']['recording'] == ''
     assert whole.attrs['probability'] == 0.95
 
 

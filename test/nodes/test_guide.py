@@ -11,6 +11,7 @@ import sys
 from fractions import Fraction
 
 import pytest
+from page_code import blocks
 
 pytest.importorskip('rclpy')
 
@@ -20,25 +21,6 @@ from nanorocks_ros.wire import topics
 # Frames of the sample bag: it rests, is shaken after a second, and cools.
 FRAMES, FEW_FRAMES = 300, 90
 PATIENCE_S = 180
-MARK = re.compile(r'^<!-- (not run: .+|goes on|Ctrl-C) -->$')
-
-
-def commands(text):
-    """Marks and indented blocks of a page, in order: (mark or '', block or '')."""
-    mark, block, marked = '', [], []
-    for line in [*text.splitlines(), 'end']:
-        if line.startswith('    ') or (block and not line):
-            block.append(line[4:])
-            continue
-        if block:
-            marked.append((mark, '\n'.join(block).rstrip() + '\n'))
-            mark, block = '', []
-        if MARK.match(line):
-            mark = MARK.match(line).group(1)
-        if mark == 'Ctrl-C':
-            marked.append((mark, ''))
-            mark = ''
-    return marked
 
 
 def make_film(path, bag, frames):
@@ -122,13 +104,13 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
     shell = Shell(tmp_path, domain)
     outputs = {}
     try:
-        for mark, block in commands((root / 'docs/start/guide.md').read_text(encoding='utf-8')):
-            if mark == 'Ctrl-C':
+        for block in blocks((root / 'docs/start/guide.md').read_text(encoding='utf-8')):
+            if block.mark == 'Ctrl-C':
                 shell.interrupt()
-            elif mark == 'goes on':
-                shell.go_on(block)
-            elif not mark:
-                outputs[block.splitlines()[-1]] = shell.run(block)
+            elif block.mark == 'goes on':
+                shell.go_on(block.text)
+            elif not block.mark:
+                outputs[block.text.splitlines()[-1]] = shell.run(block.text)
     finally:
         shell.end()
     assert re.search(r'cycle 1: COR 0\.\d+', outputs['nanorocks analyse my_film'])
@@ -146,8 +128,3 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
     report = (tmp_path / 'results/report.html').read_text(encoding='utf-8')
     assert 'run 1' in report
     assert 'läuft' in report
-
-
-def test_commands_of_a_page_are_found_with_their_marks():
-    page = 'text\n\n    one\n    two\n\n<!-- not run: why -->\n\n    three\n\n<!-- Ctrl-C -->\n'
-    assert commands(page) == [('', 'one\ntwo\n'), ('not run: why', 'three\n'), ('Ctrl-C', '')]

@@ -5,20 +5,16 @@ Tested by ``test/interface/test_analysis.py``.
 
 from __future__ import annotations
 
-import ast
-from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.errors import FitError, RecordingError
-from nanorocks_ros.experiment.recorded_experiment import recorded_settings
 from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
 from nanorocks_ros.outputs.npz_archive import read_archive
-from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.settings import PipelineSettings, rows, with_values
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import BAG_NAME, EVIDENCE
+from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
+from nanorocks_ros.studies.results.results_provenance import BAG_NAME, read_provenance
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 from nanorocks_ros.wire.products import MEASURED
@@ -28,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from nanorocks_ros.records import ArrayRecord
+    from nanorocks_ros.settings import PipelineSettings
 
 
 class ReadAnalysis(NamedTuple):
@@ -59,11 +56,16 @@ def read_analysis(folder: Path) -> ReadAnalysis:
         When a record in it is of another version.
     """
     path = folder / BAG_NAME
-    metadata = read_metadata(path)
-    settings = _settings(metadata, str(path))
+    provenance = read_provenance(folder)
+    if provenance is None:
+        raise RecordingError(str(folder), 'holds no results', 'name a folder of results')
+    settings = provenance.settings
     bag = open_bag(path)
     epoch_topic = topics.EPOCH.absolute()
-    epoch_ns = next((message.log_time_ns for message in bag.messages([epoch_topic])), 0)
+    # Results of earlier versions tell it in the recording alone.
+    epoch_ns = next(
+        (message.log_time_ns for message in bag.messages([epoch_topic])), provenance.epoch_ns
+    )
     trays = {number: TrayResults() for number in settings.trays}
     kinds = {
         product.topic.absolute(number): (product.record, number)
@@ -84,29 +86,11 @@ def read_analysis(folder: Path) -> ReadAnalysis:
         epoch_ns=epoch_ns,
         trays=trays,
         notices=list(bag.notices),
-        metadata=dict(metadata),
+        metadata=dict(bag.metadata),
         include_inconsistent=settings.cooling.include_inconsistent,
         prior=settings.prior,
     )
-    return ReadAnalysis(metadata.get('source', folder.name), analysis, settings)
-
-
-def _settings(metadata: Mapping[str, str], where: str) -> PipelineSettings:
-    """The settings by which a recording was analysed, as its results bag has them."""
-    values: dict[str, Any] = {}
-    for row in rows(PipelineSettings()):
-        if row.name not in metadata:
-            continue
-        text = metadata[row.name]
-        values[row.name] = text
-        if not isinstance(row.default, str):
-            with suppress(ValueError, SyntaxError):
-                values[row.name] = ast.literal_eval(text)
-    # Files are kept with their content, under other names.
-    values = {name: value for name, value in values.items() if not name.endswith('_file')}
-    told = {name for name in values if name != 'preprocess.calibration'}
-    settings = with_values(PipelineSettings(), {name: values[name] for name in told}, where)
-    return recorded_settings(settings, told, metadata, where).settings
+    return ReadAnalysis(provenance.source or folder.name, analysis, settings)
 
 
 def _evidence(folder: Path, trays: Mapping[int, object]) -> dict[int, CycleLikelihoods]:

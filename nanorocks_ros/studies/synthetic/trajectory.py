@@ -26,7 +26,7 @@ TABLES = '.npz', '.parquet'
 """Suffixes of these files."""
 
 _AXES = 'xyz'
-_EVENT_COLUMNS = (
+EVENT_COLUMNS = (
     Column(name='run', kind='int32', unit='1', doc='number of the run'),
     Column(name='time', unit='s', doc='since the shaking event'),
     Column(name='type', kind='string', doc='pair, wall, merge or fix'),
@@ -110,13 +110,13 @@ def trajectory_table(simulated: SimulatedRuns) -> Table:
 
 def event_table(simulated: SimulatedRuns) -> Table:
     """Columns and rows of every collision of every run, run by run."""
-    return _EVENT_COLUMNS, (_event_rows(run) for run in simulated.runs)
+    return EVENT_COLUMNS, (_event_rows(run) for run in simulated.runs)
 
 
 def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
     columns = {
         column.name: run.events[_FIELDS.get(column.name, column.name)]
-        for column in _EVENT_COLUMNS[1:]
+        for column in EVENT_COLUMNS[1:]
     }
     return {'run': np.full(len(run.events), run.number, dtype=np.int32), **columns}
 

@@ -1,4 +1,4 @@
-"""Pages of the documentation that are generated: topics, array layouts, parameters, flags, Python.
+"""Pages of the documentation that are generated: topics, tables, parameters, flags, Python.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -14,6 +14,7 @@ from nanorocks_ros import settings as st
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import FLAGS
 from nanorocks_ros.tools.docs_pages.python_page import python_page
+from nanorocks_ros.tools.docs_pages.table_page import tables_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
@@ -65,7 +66,8 @@ _GROUPS = (
 )
 
 
-def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown."""
     lines = ['| ' + ' | '.join(header) + ' |']
     lines.append('|' + '|'.join(' --- ' for _ in lines[0].split(' | ')) + '|')
     lines += ['| ' + ' | '.join(cell.replace('|', '\\|') for cell in row) + ' |' for row in rows]
@@ -80,7 +82,7 @@ def topics_page() -> str:
         'number of a tray. All are reliable; a latched topic is transient local, so that a late '
         'subscriber still gets the last message.\n\n'
     )
-    text += _table(
+    text += table(
         ('topic', 'type', 'depth', 'latched', 'content'),
         (
             (
@@ -95,7 +97,7 @@ def topics_page() -> str:
     )
     text += (
         '\nBeside these, every node publishes `/diagnostics` once a second, and `bag_player` '
-        '`/clock`.\n\n# Array layouts\n\n'
+        '`/clock`.\n\n## Array layouts\n\n'
         'The arrays are `std_msgs/Float32MultiArray`: `layout.dim[0].label` holds the field '
         'names, separated by commas. SI units; NaN means "not known yet". `epoch` tells what '
         '`time` counts from. A time takes two elements, since float32 resolves 8 ms after a day: '
@@ -107,8 +109,8 @@ def topics_page() -> str:
     )
     for product in PRODUCTS:
         array = layout(product.record)
-        text += f'\n## {array.name}\n\n{array.doc}\n\n'
-        text += _table(
+        text += f'\n### {array.name}\n\n{array.doc}\n\n'
+        text += table(
             ('element', 'field', 'unit', 'meaning'),
             (
                 (str(index), f'`{field.name}`', field.unit, field.doc)
@@ -126,7 +128,7 @@ def _beads_section() -> str:
     array = beads_layout()
     elements = array_elements(array.head)
     head, row = len(elements), len(array.bead)
-    text = f'\n## BeadsTruth\n\n{array.doc}\n\n'
+    text = f'\n### BeadsTruth\n\n{array.doc}\n\n'
     text += (
         f'{head} elements (`layout.dim[0]`), then {row} for each bead (`dim[1]`: how many beads, '
         '`dim[2]`: the names); a bead keeps its row, which is its identity.\n\n'
@@ -135,7 +137,7 @@ def _beads_section() -> str:
         *((str(index), field) for index, field in enumerate(elements)),
         *((f'{head + index} + {row} i', field) for index, field in enumerate(array.bead)),
     ]
-    return text + _table(
+    return text + table(
         ('element', 'field', 'unit', 'meaning'),
         ((place, f'`{field.name}`', field.unit, field.doc) for place, field in fields),
     )
@@ -147,7 +149,7 @@ def parameters_page() -> str:
     for title, remark, settings in _GROUPS:
         text += f'\n## {title}\n\n{type(settings).__doc__}\n\n'
         text += f'{remark}\n\n' if remark else ''
-        text += _table(
+        text += table(
             ('parameter', 'default', 'unit', 'range', 'meaning'),
             (
                 (f'`{row.name}`', _default(row.default), row.unit, _range(row), row.doc)
@@ -161,11 +163,11 @@ def flags_page() -> str:
     """Every flag with its meaning and remedy, from the register of words."""
     text = _NOTE + '# Flags\n\n'
     text += (
-        '`quality` is a sum of these values, 0 where no fault is known; the tables and the JSON '
-        'of `nanorocks analyse` and `/diagnostics` name them. '
+        '`quality` of an array is a sum of these values, 0 where no fault is known; tables, JSON '
+        'and `/diagnostics` name them. '
         '[speed.md](../method/speed.md#the-flags) says when the less obvious ones are set.\n\n'
     )
-    return text + _table(
+    return text + table(
         ('flag', 'value', 'meaning', 'what to do'),
         (
             (f'`{flag.name.lower()}`', str(flag.value), FLAGS[flag].text, FLAGS[flag].remedy)
@@ -196,6 +198,7 @@ FILES = {
     'docs/reference/parameters.md': parameters_page,
     'docs/reference/flags.md': flags_page,
     'docs/reference/python.md': python_page,
+    'docs/reference/tables.md': lambda: _NOTE + tables_page(),
 }
 
 
