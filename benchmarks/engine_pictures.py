@@ -121,7 +121,7 @@ def _discs(panel, positions, colours):
 
 def _frame(panel, box, title):
     panel.set(xlim=(0, box[0] * _MM), ylim=(0, box[1] * _MM), aspect='equal', xlabel='x [mm]')
-    panel.set_title(title)
+    panel.set_title(title, fontsize=7.5)
     ticks = np.linspace(0.0, box[0] * _MM, 4 if box[0] < 0.02 else 6)
     panel.set(xticks=ticks, yticks=ticks)
     panel.spines[:].set_visible(True)
