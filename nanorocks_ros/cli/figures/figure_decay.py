@@ -82,6 +82,11 @@ def _draw_figure(
     options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
 ) -> dict[str, Any]:
     """Draw the picture, and return its numbers."""
+    from nanorocks_ros.studies.analysis.published_cycles import (
+        published_cycles,
+        published_lines,
+        truth_of,
+    )
     from nanorocks_ros.studies.decays.cooling_curves import cooling_part, species_cycles
     from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
     from nanorocks_ros.studies.figures.decay_figure import decay_figure
@@ -91,6 +96,8 @@ def _draw_figure(
     )
 
     path, walls = Path(options.output), options.wall_restitution
+    published = published_cycles(table, tray.number)
+    lines = published_lines(published, truth_of(table.parent, tray.number))
     window = cooling_window(table)
     start = window.start if window else 0.0
     default_span = (window.first, window.last) if window and start > 0.0 else _SPAN
@@ -98,9 +105,18 @@ def _draw_figure(
     if options.kind == 'decay':
         species = species_cycles(table, tray)
         return decay_figure(
-            path, tray, cycles, wall_restitution=walls, span=span, species=species, start=start
+            path,
+            tray,
+            cycles,
+            wall_restitution=walls,
+            span=span,
+            species=species,
+            start=start,
+            published=lines,
         )
     cycles, span = cooling_part(cycles, span, start)
     return instantaneous_values(
-        instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+        instantaneous_figure(
+            path, tray, cycles, wall_restitution=walls, span=span, published=lines
+        )
     )

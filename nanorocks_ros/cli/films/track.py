@@ -94,14 +94,22 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 def _write(options: argparse.Namespace, bag: TrackedBag) -> None:
     from nanorocks_ros.studies.analysis.tracks_files import write_tracks
-    from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
+    from nanorocks_ros.studies.inspection.track_overlay import (
+        MAGNIFICATION,
+        overlay,
+        with_scale_bar,
+        write_overlay,
+    )
 
     if options.output:
         write_tracks(Path(options.output), bag)
         print(f'nanorocks: tracks in {options.output}', file=sys.stderr)
     if options.picture:
         pictures = [
-            overlay(image, bag.tracks[number], bag.pixels_per_metre)
+            with_scale_bar(
+                overlay(image, bag.tracks[number], bag.pixels_per_metre),
+                MAGNIFICATION * bag.pixels_per_metre,
+            )
             for number, image in sorted(bag.pictures.items())
         ]
         write_overlay(Path(options.picture), pictures)

@@ -118,7 +118,8 @@ def write_results(
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
             _write_tables(analysis, fresh, source, settings, form)
-            _write_bag(analysis, fresh / BAG_NAME, _bag_provenance(source, settings))
+            carried = _bag_provenance(source, settings) | _truth(analysis)
+            _write_bag(analysis, fresh / BAG_NAME, carried)
             if more is not None:
                 more(fresh)
             if folder.exists():
@@ -188,6 +189,22 @@ def _bag_provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
         **{row.name: str(row.default) for row in rows(settings)},
         **metadata_of_settings(settings),
     }
+
+
+def truth_keys(tray: int) -> tuple[str, str]:
+    """Keys of the true restitutions of a tray, of beads and of walls, in the results bag."""
+    return f'truth.tray_{tray}.restitution', f'truth.tray_{tray}.wall_restitution'
+
+
+def _truth(analysis: Analysis) -> dict[str, str]:
+    """The true restitutions of simulated trays, which figures show beside those measured."""
+    known: dict[str, str] = {}
+    for number, results in analysis.trays.items():
+        if results.truth:
+            last = results.truth[-1]
+            values = f'{last.restitution:g}', f'{last.wall_restitution:g}'
+            known |= dict(zip(truth_keys(number), values, strict=True))
+    return known
 
 
 def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:

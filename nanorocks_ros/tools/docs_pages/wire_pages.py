@@ -1,4 +1,4 @@
-"""Pages of the documentation that are generated: topics, arrays, tables, parameters, flags.
+"""Pages of the documentation that are generated: topics, tables, parameters, flags, Python.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros import settings as st
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import FLAGS
+from nanorocks_ros.tools.docs_pages.python_page import python_page
 from nanorocks_ros.tools.docs_pages.table_page import tables_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
@@ -189,7 +190,8 @@ FILES = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
     'docs/reference/flags.md': flags_page,
-    'docs/reference/tables.md': lambda: _NOTE + tables_page(),
+    'docs/reference/python.md': python_page,
+    'docs/reference/tables.md': tables_page,
 }
 
 

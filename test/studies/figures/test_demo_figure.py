@@ -5,11 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import cv2
+from matplotlib.colors import to_rgb
 
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.figures.demo_figure import cooling_figure
+
+
+def bgr(colour):
+    return tuple(round(255 * part) for part in to_rgb(colour))[::-1]
+
 
 SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
 
@@ -24,4 +31,4 @@ def test_the_figure_of_a_cycle_is_drawn(tmp_path):
     assert min(picture.shape[:2]) > 500
     # Colours of the measured points and of the fit.
     colours = {tuple(state) for state in picture.reshape(-1, 3)[::7].tolist()}
-    assert {(0x6F, 0x50, 0x30), (0x22, 0x3B, 0xC2)} <= colours
+    assert {bgr(MEASURED), bgr(FITTED)} <= colours
