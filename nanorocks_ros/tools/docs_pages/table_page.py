@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.outputs.table_columns import Column
 
 _INTRODUCTION = """\
+<!-- Made by `make docs` from the code; change that instead. -->
+
 # Tables
 
 Every table that a command writes follows one convention; pandas, R and Excel read it as it is.

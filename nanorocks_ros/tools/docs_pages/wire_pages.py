@@ -198,7 +198,7 @@ FILES = {
     'docs/reference/parameters.md': parameters_page,
     'docs/reference/flags.md': flags_page,
     'docs/reference/python.md': python_page,
-    'docs/reference/tables.md': lambda: _NOTE + tables_page(),
+    'docs/reference/tables.md': tables_page,
 }
 
 
