@@ -16,6 +16,7 @@ from numba import extending
 from numba.core import event
 
 from nanorocks_ros.numerics.kernel_cache import share
+from nanorocks_ros.numerics.lean_compilation import compile_lean
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -124,4 +125,6 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 
 def _njit(function: Function, options: dict[str, Any]) -> Function:
     decorator: Any = numba.njit(**{**_OPTIONS, **options})
-    return cast('Function', decorator(function))
+    dispatcher = decorator(function)
+    compile_lean(dispatcher)
+    return cast('Function', dispatcher)
