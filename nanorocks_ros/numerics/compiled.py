@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 LOGGER = logging.getLogger('nanorocks_ros')
 
 # Functions that take longest to compile, and the part of the program they belong to.
-_SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
+_SLOWEST = {'run_until': 'the simulation', 'cover_with_discs': 'the tracking'}
 
 _OPTIONS = {'error_model': 'numpy', 'nogil': True}
 
@@ -55,7 +55,7 @@ class _Announcer(event.Listener):
         name = event.data['dispatcher'].py_func.__name__
         if name in _SLOWEST and name not in self._told:
             self._told.add(name)
-            LOGGER.info('compiling %s, once on this machine: about half a minute', _SLOWEST[name])
+            LOGGER.info('compiling %s, once on this machine', _SLOWEST[name])
 
     def on_end(self, event: event.Event) -> None:
         pass

@@ -18,9 +18,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary, WeakSet
 
-from llvmlite.binding import Linkage
-from numba.core import codegen, compiler, dispatcher, event, types, typing
+from numba.core import codegen, compiler, dispatcher, event, types
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.typing import templates
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -29,6 +29,12 @@ _Types = tuple[Any, ...]
 
 COMPILED = 'nanorocks:compile'
 """Event of numba: a version of a function, which compiled functions may call, is compiled."""
+
+
+# Parts of numba without types.
+_without_constants: Any = types.unliteral
+_template_of: Any = templates.make_concrete_template
+_compile_extra: Any = compiler.compile_extra
 
 
 class _Library(codegen.JITCodeLibrary):
@@ -47,8 +53,8 @@ class _CalledLibrary(_Library):
     def _finalize_final_module(self) -> None:
         """Let callers link the code; it is not translated."""
         for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage == Linkage.external:
-                function.linkage = Linkage.linkonce_odr
+            if not function.is_declaration and function.linkage.name == 'external':
+                function.linkage = 'linkonce_odr'
         self._shared_module = self._final_module
         self._finalized = True
 
@@ -88,15 +94,15 @@ class _CalledVersions:
     ) -> tuple[Any, Any, _Types, dict[str, Any]]:
         """What numba asks for to type a call; compiles the version where it is missing."""
         if self._function in _OWN:
-            args = tuple(types.unliteral(kind) for kind in args)
-            kws = {name: types.unliteral(kind) for name, kind in kws.items()}
+            args = tuple(_without_constants(kind) for kind in args)
+            kws = {name: _without_constants(kind) for name, kind in kws.items()}
         pysig, folded = self._function.fold_argument_types(args, kws)
         key = tuple(folded)
         if key not in self._versions:
             self._versions[key] = self._compiled(key)
         name = self._function.py_func.__name__
         signatures = [self._versions[key][1]]
-        template = typing.make_concrete_template(f'call of {name}', name, signatures)
+        template = _template_of(f'call of {name}', name, signatures)
         return template, pysig, key, {}
 
     def code(self, args: _Types) -> object:
@@ -134,19 +140,20 @@ def compile_lean(function: Any) -> None:
     function._compiler.compile = compiled
 
 
-def _flags(function: Any) -> _Flags:
-    flags = _Flags()
+def _flags(function: Any) -> Any:
+    flags_of: Any = _Flags
+    flags = flags_of()
     function.targetdescr.options.parse_as_flags(flags, function.targetoptions)
     return flags
 
 
-def _compile(function: Any, args: _Types, flags: _Flags, kind: type[_Library]) -> Any:
+def _compile(function: Any, args: _Types, flags: Any, kind: type[_Library]) -> Any:
     context = function.targetctx
-    library = kind(context.codegen(), function.py_func.__qualname__)
+    library: Any = kind(context.codegen(), function.py_func.__qualname__)
     library.enable_object_caching()
     details = {'dispatcher': function, 'args': args, 'return_type': None}
     with event.trigger_event(COMPILED, data=details):
-        return compiler.compile_extra(
+        return _compile_extra(
             function.typingctx,
             context,
             function.py_func,

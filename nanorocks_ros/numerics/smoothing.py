@@ -5,7 +5,7 @@ The filter of `scipy.signal`, bit by bit; to import that package takes a quarter
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import linalg
@@ -59,5 +59,6 @@ def _fitted(
     window = values.shape[-1]
     rows = np.moveaxis(values, -1, 0)
     fits = np.polyfit(np.arange(window, dtype=np.float64), rows.reshape(window, -1), order)
-    fitted = np.polyval(fits, places[:, np.newaxis].astype(np.float64))
-    return np.moveaxis(fitted.reshape(places.size, *rows.shape[1:]), 0, -1)
+    fitted: Any = np.polyval(fits, places[:, np.newaxis].astype(np.float64))
+    ends: NDArray[np.float64] = fitted.reshape(places.size, *rows.shape[1:])
+    return np.moveaxis(ends, 0, -1)
