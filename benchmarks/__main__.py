@@ -14,6 +14,7 @@ from importlib import import_module
 from benchmarks import fuzz, golden, kills, structure
 
 ALL = (
+    'cold_start',
     'offline',
     'batch',
     'live',

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from nanorocks_ros.errors import ConfigurationError
 
@@ -69,6 +68,9 @@ def robust_trend(cycles: NDArray[np.float64], values: NDArray[np.float64]) -> Tr
     if x.size < _FEWEST or np.ptp(x) == 0.0:
         middle = float(np.median(y)) if y.size else math.nan
         return Trend(slope=math.nan, slope_error=math.nan, middle=middle, samples=int(x.size))
+    # Half a second to import, and only a series of many cycles needs it.
+    from scipy import stats
+
     slope, _, low, high = stats.theilslopes(y, x, alpha=_ONE_SIGMA)
     return Trend(
         slope=float(slope),

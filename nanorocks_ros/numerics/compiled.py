@@ -16,6 +16,7 @@ from numba import extending
 from numba.core import event
 
 from nanorocks_ros.numerics.kernel_cache import share
+from nanorocks_ros.numerics.lean_compilation import compile_lean
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 LOGGER = logging.getLogger('nanorocks_ros')
 
 # Functions that take longest to compile, and the part of the program they belong to.
-_SLOWEST = {'run_until': 'the simulation', 'cover': 'the tracking'}
+_SLOWEST = {'run_until': 'the simulation', 'cover_with_discs': 'the tracking'}
 
 _OPTIONS = {'error_model': 'numpy', 'nogil': True}
 
@@ -54,7 +55,7 @@ class _Announcer(event.Listener):
         name = event.data['dispatcher'].py_func.__name__
         if name in _SLOWEST and name not in self._told:
             self._told.add(name)
-            LOGGER.info('compiling %s, once on this machine: about half a minute', _SLOWEST[name])
+            LOGGER.info('compiling %s, once on this machine', _SLOWEST[name])
 
     def on_end(self, event: event.Event) -> None:
         pass
@@ -124,4 +125,6 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 
 def _njit(function: Function, options: dict[str, Any]) -> Function:
     decorator: Any = numba.njit(**{**_OPTIONS, **options})
-    return cast('Function', decorator(function))
+    dispatcher = decorator(function)
+    compile_lean(dispatcher)
+    return cast('Function', dispatcher)

@@ -10,7 +10,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from nanorocks_ros.inference.decay.decay_library import (
     LOWEST_WALL,
@@ -20,6 +19,7 @@ from nanorocks_ros.inference.decay.decay_library import (
 )
 from nanorocks_ros.inference.decay.decay_likelihood import DecayTables, RoughTables
 from nanorocks_ros.inference.decay.friction_terms import FRICTION
+from nanorocks_ros.numerics.smoothing import savitzky_golay
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,8 +34,8 @@ _BEAD_NODES, _WALL_NODES = 35, 20
 BEAD_POWER, WALL_POWER = 1.0 / 1.5, 0.5
 # Frictions at which decays are compared, beside 0.
 FRICTIONS = (0.004, 0.012, 0.035, 0.1)
-# Cells of ln t over which curves of the library are smoothed.
-_SMOOTH_CELLS = 9
+# Cells of ln t over which curves of the library are smoothed, and the order of the fits.
+_SMOOTH_CELLS, _SMOOTH_ORDER = 9, 3
 
 
 @lru_cache(maxsize=16)
@@ -120,7 +120,7 @@ def _smooth(curves: NDArray[np.float64]) -> NDArray[np.float64]:
     Their slopes determine how far amplitude and scale compensate each other. Where the speed falls
     as 1/t they nearly do, so that noise of 0.01 from cell to cell would dominate.
     """
-    return np.asarray(savgol_filter(curves, _SMOOTH_CELLS, 3, axis=-1))
+    return savitzky_golay(curves, _SMOOTH_CELLS, _SMOOTH_ORDER)
 
 
 def _spreads(tray: Tray, settings: PriorSettings) -> tuple[float, ...]:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from nanorocks_ros.records import CorStatus, Quality
 from nanorocks_ros.studies.analysis.result_tables import read_columns
@@ -199,7 +198,9 @@ def _size(
     values = sizes[measure.column][own]
     if values.size == 0:
         return {'cluster_size': math.nan, 'cluster_size_error': math.nan}
-    middle = float(stats.trim_mean(values, _TRIMMED))
+    left_out = int(_TRIMMED * values.size)
+    ends = left_out, values.size - left_out
+    middle = float(np.mean(np.partition(values, (ends[0], ends[1] - 1))[slice(*ends)]))
     error = math.nan
     if values.size > 1:
         error = _WORSE * float(np.std(values, ddof=1)) / math.sqrt(values.size)

@@ -17,8 +17,6 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.recordings.bag.find_bags import is_recording
 from nanorocks_ros.recordings.film.image_folder import images_in
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
-from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
-from nanorocks_ros.studies.film_import.import_film import import_films
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,6 +76,10 @@ def cached_import(film: Path, progress: Callable[[float], None]) -> CachedFilm:
     RecordingError
         If the film cannot be read, or no cache folder can be written.
     """
+    # Every command asks whether it is given a film; what writes bags takes time to import.
+    from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
+    from nanorocks_ros.studies.film_import.import_film import import_films
+
     state = _state(film)
     folder = cache_folder(film)
     bag, record = folder / film.resolve().name, folder / f'{film.resolve().name}.json'
