@@ -115,7 +115,7 @@ def command_line_page(parser: argparse.ArgumentParser) -> str:
 
 def _command_section(command: Command, rows: list[OptionRow], shared: set[OptionRow]) -> str:
     own = [row for row in rows if row not in shared]
-    needed = [row.call for row in rows if row.is_required]
+    needed = [row.call.split(', ')[-1] for row in rows if row.is_required]
     others = ['[OPTION ...]'] if len(needed) < len(rows) else []
     about = (command.parser.description or command.summary).replace('%(prog)s', command.name)
     call = ' '.join([command.name, *needed, *others])

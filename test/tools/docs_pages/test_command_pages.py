@@ -61,7 +61,7 @@ def test_what_many_commands_share_is_explained_once():
 
 def test_a_command_shows_what_it_needs():
     part = sections(command_line_page(small_parser()))['tool d']
-    assert 'tool d -o, --output OUTPUT film [film ...] [OPTION ...]' in part
+    assert 'tool d --output OUTPUT film [film ...] [OPTION ...]' in part
     assert '| `-o, --output OUTPUT` | a file (needed) |' in part
     assert 'read 100 % of it' in part
     assert 'does d' in part
