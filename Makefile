@@ -27,7 +27,7 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-oldest golden lint bench docs venv lock clean
+.PHONY: help demo test test-oldest golden lint bench docs venv messages lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -82,6 +82,10 @@ venv: ## Set up the environment that all of these use
 	esac
 	@sh requirements/set_up.sh $(SET_UP)
 
+messages: ## Build the typed messages from wheels, for their tests (needs cmake and a compiler)
+	@sh requirements/set_up.sh .venv-messages requirements/messages.txt
+	@sh requirements/build_messages.sh .venv-messages build/messages msg_defs/nanorocks_msgs
+
 # For maintainers: the other targets only read the lock files. Needs `uv` (pip install uv).
 COMPILE := uv pip compile --quiet --universal --python-version 3.10 --no-annotate --generate-hashes \
            --no-emit-package nanorocks-ros --custom-compile-command 'make lock' setup.cfg
@@ -91,8 +95,9 @@ lock: ## Renew the lock files in requirements/ (needs uv)
 	    --constraints - --output-file requirements/jazzy.txt
 	@$(COMPILE) --upgrade --extra test --resolution lowest-direct \
 	    --output-file requirements/oldest.txt
+	@$(COMPILE) --upgrade --extra messages --output-file requirements/messages.txt
 
 clean: ## Remove the environments, builds and caches
-	@rm -rf .venv .venv-jazzy $(OLDEST) build install log ./*.egg-info \
+	@rm -rf .venv .venv-jazzy .venv-messages $(OLDEST) build install log ./*.egg-info \
 	    .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

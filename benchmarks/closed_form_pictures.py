@@ -15,6 +15,7 @@ import numpy as np
 from nanorocks_ros.cli.main import main as nanorocks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
@@ -47,7 +48,7 @@ def measured_cycles(path, cycles, error, *, tray=1, restitution=0.89, walls=0.99
         for k in range(cycles)
         for age, speed in zip(TIMES.tolist(), noisy[k].tolist(), strict=True)
     ]
-    write_csv(path, list(FIELDS), list(FIELDS.values()), rows)
+    write_csv(path, float_columns(FIELDS, FIELDS.values()), rows)
 
 
 def measured_mixture(path, cycles, error, *, tray=5, restitution=0.89, walls=0.97, seed=4):
@@ -81,7 +82,7 @@ def measured_mixture(path, cycles, error, *, tray=5, restitution=0.89, walls=0.9
         for name in ('first', 'second')
         for suffix in ('', '_error')
     ]
-    write_csv(path, [*FIELDS, *names], [*FIELDS.values(), *['m/s'] * 4], rows)
+    write_csv(path, float_columns([*FIELDS, *names], [*FIELDS.values(), *['m/s'] * 4]), rows)
 
 
 def _draw(folder, scratch):

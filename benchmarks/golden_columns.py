@@ -132,7 +132,8 @@ def _csv_columns(path: Path) -> dict[str, Column]:
     for index, name in enumerate(names):
         cells = [row[index] for row in rows]
         try:
-            columns[name] = np.array([float(cell) for cell in cells])
+            # An empty cell is a number that is not known.
+            columns[name] = np.array([float(cell or 'nan') for cell in cells])
         except ValueError:
             columns[name] = cells
     return columns

@@ -79,7 +79,7 @@ class _Tally:
 
     def _noted(self, times: dict[int, float], kind):
         # A message ends with the values; the time is the first of them.
-        values_size = 4 * len(layout(kind).fields)
+        values_size = 4 * len(layout(kind).elements)
 
         def record_time(cdr: bytes) -> None:
             now = self.last = time.monotonic()

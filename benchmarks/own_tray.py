@@ -30,7 +30,7 @@ DESCRIBE = (
     *('tray', 'film.mp4', '--corners', '56', '56', '776', '536', '--sides-mm', '90', '60'),
     *('--height-mm', '4', '--diameter-px', '24', '--diameter-mm', '3', '-o', 'mine.yaml'),
 )
-MEASURE = ('measure', 'film.mp4', '--tray', 'mine.yaml', '-o', 'out')
+MEASURE = ('measure', 'film.mp4', '--trays-file', 'mine.yaml', '-o', 'out')
 
 
 def run(folder, arguments):

@@ -5,6 +5,12 @@ Tested by ``test/nodes/base/test_diagnostics.py``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 
 class NanorocksError(Exception):
     """An input that cannot be used, as one sentence: ``where: what; do``.
@@ -55,3 +61,22 @@ class SimulationError(NanorocksError):
 
 class DashboardError(NanorocksError):
     """A live page that cannot be served: its address, its port."""
+
+
+def did_you_mean(word: str, known: Iterable[str] | Mapping[str, str]) -> str:
+    """A question with the words nearest to one that is not known; empty where none is near.
+
+    Parameters
+    ----------
+    word : str
+        As the user wrote it.
+    known : iterable of str, or mapping of str to str
+        All words that are known; of a mapping the values are proposed.
+    """
+    from difflib import get_close_matches
+
+    proposed = known if isinstance(known, Mapping) else {name: name for name in known}
+    by_letters = {name.casefold(): proposal for name, proposal in proposed.items()}
+    nearest = get_close_matches(word.casefold(), by_letters, n=2, cutoff=0.7)
+    proposals = dict.fromkeys(by_letters[name] for name in nearest)
+    return f'did you mean {" or ".join(proposals)}?' if proposals else ''

@@ -12,7 +12,7 @@ from nanorocks_ros import records
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md'), ROOT / 'bags/README.md'])
-SUFFIXES = r'(_error|_errors|_lower|_upper|_[xy]|_[12])*$'
+SUFFIXES = r'(_error|_errors|_lower|_upper|_68|_[xy]|_[12])*$'
 LINK = re.compile(r'(?<!`)\[[^\]]*\]\(([^)\s]+)\)')
 
 

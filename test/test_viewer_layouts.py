@@ -53,7 +53,7 @@ def fields(root):
     """Fields of the message definitions, parsed independently of the package."""
     folder = root / 'msg_defs/nanorocks_msgs/msg'
     return {
-        topic: re.findall(r'^float32 ([a-z]\w*) ', (folder / f'{name}.msg').read_text(), re.M)
+        topic: re.findall(r'^\w+ ([a-z]\w*) +# \[', (folder / f'{name}.msg').read_text(), re.M)
         for topic, name in MESSAGES.items()
     }
 

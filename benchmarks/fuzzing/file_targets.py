@@ -22,6 +22,7 @@ from nanorocks_ros.inference.cluster_size.cluster_curve import load_curves
 from nanorocks_ros.inference.decay.decay_library_file import load_library
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.recordings.film.video import Video
 from nanorocks_ros.recordings.offered_qos import recorded_qos
 from nanorocks_ros.studies.analysis.result_tables import read_columns
@@ -161,7 +162,7 @@ class Results:
         shutil.copy(_PACKAGE / 'cluster_size' / 'cluster_curves.npz', folder / 'curves.npz')
         _write_sweep(folder / 'sweep.npz')
         names, rows = ('time', 'size'), [(0.1 * k, float(k)) for k in range(80)]
-        write_csv(folder / 't.csv', names, ('s', 'm'), rows)
+        write_csv(folder / 't.csv', float_columns(names, ('s', 'm')), rows)
         (folder / 'summary.json').write_text(json.dumps({'format': 1, 'trays': {}, 'bag': 'x'}))
         self._readers: tuple[tuple[str, Callable[[Path], object]], ...] = (
             ('sweep.npz', read_archive),

@@ -6,20 +6,19 @@ Tested by ``test/studies/analysis/test_offline_analysis.py``.
 from __future__ import annotations
 
 import json
-import math
+import shlex
 import sys
 from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.records import CorRelation
-from nanorocks_ros.settings import priors_in_words
+from nanorocks_ros.cli.remedies import results_beside, with_own_files
+from nanorocks_ros.errors import ConfigurationError, NanorocksError
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
+    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
 _EPILOG = """\
 Several bags, a pattern or a folder of bags are a batch. It uses one worker for each core, and the
@@ -35,18 +34,17 @@ Examples:
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    import argparse
-
     from nanorocks_ros.cli.analyse_batch import add_options
+    from nanorocks_ros.cli.film_inputs import accept_films
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
         'analyse',
         help='analyse one bag or many offline',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_bag(parser, many=True)
+    accept_films(parser, 'bags', _check_film)
     parser.add_argument(
         '-o',
         '--output',
@@ -67,6 +65,7 @@ def add_parser(commands: Any) -> None:
         help='count decays that contacts contradict, too, in the means of all cycles',
     )
     add_options(parser)
+    parser.leave_out('--no-output', '--include-inconsistent', '--scheduler')
     parser.set_defaults(run=run)
 
 
@@ -78,6 +77,23 @@ def run(options: argparse.Namespace) -> int:
     # Checked before hours of work.
     check_parquet(Path(f'tables.{options.format}'))
     return run_many(options) if is_batch(options) else _run_one(options)
+
+
+def _check_film(options: argparse.Namespace, film: str) -> None:
+    """Refuse a film of unknown beads: nothing in it says which of the trays it shows."""
+    from nanorocks_ros.cli.flags import told_settings
+
+    if told_settings(options, options.parameters) & {'trays', 'trays_file'}:
+        return
+    folder = shlex.quote(results_beside(film, 'measured'))
+    name = shlex.quote(film)
+    raise ConfigurationError(
+        film,
+        'does not say which trays it shows',
+        f'measure a film of your own: nanorocks measure {name} --diameter-px 31 -o {folder}, with '
+        'the diameter of a bead in px; or name the trays of the flight: '
+        f'nanorocks analyse {name} --trays 3',
+    )
 
 
 def _run_one(options: argparse.Namespace) -> int:
@@ -111,11 +127,11 @@ def _run_one(options: argparse.Namespace) -> int:
         except NanorocksError as unwritten:
             error = unwritten
     for notice in analysis.notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
     if options.json:
         print(json.dumps(as_json(analysis), allow_nan=False))
     else:
-        _print(analysis)
+        _print(analysis, options)
     if written:
         print(written, file=sys.stderr)
     if error is not None:
@@ -140,52 +156,12 @@ def _scratch_folder() -> Path | None:
         return None
 
 
-def _print(analysis: Analysis) -> None:
+def _print(analysis: Analysis, options: argparse.Namespace) -> None:
+    from nanorocks_ros.studies.analysis.tray_words import tray_lines
+
     lost = f', {analysis.frames_lost} lost' if analysis.frames_lost else ''
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
         for line in tray_lines(analysis, results):
-            print(f'  {line}')
-
-
-def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
-    """The cycles of a tray in lines of text."""
-    from nanorocks_ros.studies.analysis.cycle_words import (
-        cycle_lines,
-        is_decay_left_out,
-        tray_reason,
-        used_speeds,
-        wall_prior,
-    )
-    from nanorocks_ros.studies.analysis.results_json import (
-        end_of_cycle,
-        ends_of_cycles,
-        last_of_each_cycle,
-    )
-
-    recognised = [line for verdict in results.verdicts for line in verdict.lines()]
-    reason = tray_reason(results)
-    if reason is not None:
-        return [*recognised, f'no COR: {reason.text}; {reason.remedy}']
-    cycles = last_of_each_cycle(results.cors)
-    used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
-    ends = ends_of_cycles(results.clusters)
-    lines = [*recognised, f'priors: {priors_in_words(analysis.prior)}']
-    left_out = 0
-    for cor in cycles:
-        is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)
-        left_out += is_out
-        lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
-    mean = cycles[-1].mean_restitution
-    if len(cycles) > 1 and math.isfinite(mean.value):
-        without = f', without the decays of {left_out}' if left_out else ''
-        lines.append(f'all cycles: COR {mean.value:.4f} +- {mean.error:.4f}{without}')
-    if results.truth:
-        truth = results.truth[-1]
-        lines.append(f'truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
-    if cycles[-1].relation is CorRelation.PAPER:
-        lines.append(
-            "relation 'paper': its interval is statistical only, see docs/method/physics.md"
-        )
-    return lines
+            print(f'  {with_own_files(line, options)}')

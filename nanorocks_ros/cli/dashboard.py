@@ -9,6 +9,7 @@ import os
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_trays_file
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import DashboardGraphSettings, DashboardSettings
 
@@ -24,9 +25,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '--namespace', default='', help='namespace of the graph, such as /lab; default /nanorocks'
     )
-    parser.add_argument(
-        '--trays-file', default='', help='YAML file of trays, the same as that of the graph'
-    )
+    add_trays_file(parser, 'those of the flight; give that of the graph')
     add_flags(parser, DashboardSettings(), skip=set())
     parser.set_defaults(run=run)
 

@@ -9,13 +9,21 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Callable
 
 _ARGUMENT = 'film_argument'
 
 
-def accept_films(parser: argparse.ArgumentParser, argument: str) -> None:
-    """Let an argument of a command, which names bags, name films as well."""
-    parser.set_defaults(**{_ARGUMENT: argument})
+def accept_films(
+    parser: argparse.ArgumentParser,
+    argument: str,
+    check: Callable[[argparse.Namespace, str], None] = lambda options, film: None,
+) -> None:
+    """Let an argument of a command, which names bags, name films as well.
+
+    Before a film is imported, which takes time, `check` may refuse it.
+    """
+    parser.set_defaults(**{_ARGUMENT: argument, 'check_film': check})
 
 
 def use_imports(options: argparse.Namespace) -> None:
@@ -32,12 +40,14 @@ def use_imports(options: argparse.Namespace) -> None:
     if argument is None:
         return
     value = getattr(options, argument)
-    if isinstance(value, list):
-        options.named = [name for text in value for name in _expanded(text)]
-        setattr(options, argument, [_recording(name) for name in options.named])
-    else:
-        options.named = [value]
-        setattr(options, argument, _recording(value))
+    is_list = isinstance(value, list)
+    names = [name for text in value for name in _expanded(text)] if is_list else [value]
+    options.named = names
+    for name in names:
+        if _is_film(name):
+            options.check_film(options, name)
+    recordings = [_recording(name) for name in names]
+    setattr(options, argument, recordings if is_list else recordings[0])
 
 
 def _expanded(text: str) -> list[str]:

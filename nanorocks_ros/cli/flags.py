@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import logging
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 
 from nanorocks_ros.cli.film_inputs import accept_films
+from nanorocks_ros.cli.parsing.command_parser import offer
+from nanorocks_ros.cli.parsing.tray_options import add_tray_or_file, not_a_number
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.yaml_limits import load_yaml
 from nanorocks_ros.experiment.yaml_lines import read_text
@@ -22,38 +25,82 @@ from nanorocks_ros.settings import (
 )
 
 if TYPE_CHECKING:
+    from nanorocks_ros.cli.parsing.command_parser import CommandParser
     from nanorocks_ros.experiment.recorded_experiment import RecordedSettings
 
 SettingsType = TypeVar('SettingsType')
 _LOGGER = logging.getLogger(__name__)
+_SWITCH = 'on', 'off'
 
 
 def add_flags(
-    parser: argparse.ArgumentParser, settings: Any, skip: set[str], title: str = 'settings'
+    parser: CommandParser, settings: Any, skip: set[str], title: str = 'settings'
 ) -> None:
-    """Add a flag for each setting: ``speed.method`` becomes ``--speed-method``."""
-    group = parser.add_argument_group(title)
+    """Add a flag for each setting, in a group for each stage.
+
+    ``speed.method`` becomes ``--speed-method``. The short help shows the everyday settings.
+    """
+    stages: dict[str, Any] = {}
     for row in rows(settings):
         if row.name in skip:
             continue
-        unit = f' [{row.unit}]' if row.unit else ''
-        nargs = '*' if isinstance(row.default, tuple) else None
-        group.add_argument(
-            flag_of(row.name),
-            dest=row.name,
-            metavar='V',
-            nargs=nargs,
-            help=f'{row.doc}{unit}; default {_default_text(row)}'.replace('%', '%%'),
-        )
+        stage = row.name.rpartition('.')[0]
+        if stage not in stages:
+            stages[stage] = parser.add_argument_group(_stage_title(settings, stage) or title)
+        action = add_flag(stages[stage], row, _default_text(row))
+        if not row.everyday:
+            parser.leave_out(action)
         if row.deprecated:
-            group.add_argument(
-                flag_of(row.deprecated), dest=row.deprecated, nargs=nargs, help=argparse.SUPPRESS
+            stages[stage].add_argument(
+                flag_of(row.deprecated),
+                dest=row.deprecated,
+                nargs=action.nargs,
+                help=argparse.SUPPRESS,
             )
 
 
-def add_bag(
-    parser: argparse.ArgumentParser, skip: set[str] | None = None, *, many: bool = False
-) -> None:
+def add_flag(
+    group: Any, row: SettingRow, default: str, flags: tuple[str, ...] = ()
+) -> argparse.Action:
+    """Add the flag of one setting; `flags` in place of that of its name."""
+    unit = f' [{row.unit}]' if row.unit else ''
+    action: argparse.Action = group.add_argument(
+        *(flags or (flag_of(row.name),)),
+        dest=row.name,
+        metavar=_placeholder(row),
+        nargs='*' if isinstance(row.default, tuple) else None,
+        help=f'{row.doc}{unit}; default {default}'.replace('%', '%%'),
+    )
+    words = row.bounds.choices or (_SWITCH if isinstance(row.default, bool) else ())
+    # Texts without choices are files.
+    if words or not isinstance(row.default, str):
+        offer(action, words)
+    return action
+
+
+def _stage_title(settings: Any, stage: str) -> str:
+    """What a group of settings is about; empty for settings of no group."""
+    if not stage:
+        return ''
+    text = (type(attrgetter(stage)(settings)).__doc__ or '').partition('.')[0]
+    return f'{stage}: {text[:1].lower()}{text[1:]}'
+
+
+def _placeholder(row: SettingRow) -> str:
+    """What stands for the value of a setting: M, S, PX, on|off, {auto,tracking}."""
+    if row.placeholder:
+        return row.placeholder
+    if row.bounds.choices:
+        return f'{{{",".join(row.bounds.choices)}}}'
+    if isinstance(row.default, bool):
+        return '|'.join(_SWITCH)
+    if row.unit:
+        return row.unit.upper()
+    is_whole = isinstance(row.default, int) or row.bounds.whole
+    return 'TEXT' if isinstance(row.default, str) else 'N' if is_whole else 'NUMBER'
+
+
+def add_bag(parser: CommandParser, skip: set[str] | None = None, *, many: bool = False) -> None:
     """Add the arguments of commands that process a bag, with a flag for each setting."""
     kind = 'rosbag2 folder, .mcap file, video or folder of images'
     if many:
@@ -65,9 +112,16 @@ def add_bag(
     accept_films(parser, 'bags' if many else 'bag')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument(
-        '--image-topic', default='', help='camera topic; default: that of our nodes'
+        '--image-topic',
+        default='',
+        metavar='TOPIC',
+        help='camera topic; default: that of our nodes',
     )
-    parser.add_argument('--parameters', help='ROS parameter file, as for the nodes')
+    parser.add_argument(
+        '--parameters', metavar='YAML', help='ROS parameter file, as for the nodes'
+    )
+    parser.leave_out('--image-topic', '--parameters')
+    add_tray_or_file(parser)
     add_flags(parser, PipelineSettings(), skip=skip or set())
 
 
@@ -79,6 +133,8 @@ def flag_of(name: str) -> str:
 def _default_text(row: SettingRow) -> str:
     if isinstance(row.default, tuple):
         return ' '.join(str(value) for value in row.default) or 'empty'
+    if isinstance(row.default, bool):
+        return _SWITCH[0] if row.default else _SWITCH[1]
     return str(row.default) if row.default != '' else 'empty'
 
 
@@ -149,9 +205,10 @@ def _parsed(row: SettingRow, text: Any) -> Any:
         numbers = [_number(word) for word in _words(text)]
         return numbers if isinstance(row.default, tuple) else numbers[0]
     except (yaml.YAMLError, ValueError) as error:
-        raise ConfigurationError(
-            flag_of(row.name), f'{text!r} cannot be read', 'give a number'
-        ) from error
+        where, shown = flag_of(row.name), ' '.join(_words(text))
+        if row.name in ('tray', 'trays'):
+            raise ConfigurationError(where, *not_a_number(shown)) from error
+        raise ConfigurationError(where, f'{shown!r} cannot be read', 'give a number') from error
 
 
 def _number(text: str) -> int | float:
@@ -162,7 +219,10 @@ def _number(text: str) -> int | float:
 
 
 def _words(text: str | list[str]) -> list[str]:
-    return [text] if isinstance(text, str) else text
+    """The words of one value, or of a list, which commas may separate as well."""
+    if isinstance(text, str):
+        return [text]
+    return [part for word in text for part in word.split(',') if part]
 
 
 def _from_file(path: Path) -> dict[str, Any]:

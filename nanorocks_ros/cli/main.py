@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
-import logging
 import os
 import sys
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from nanorocks_ros import __version__
-from nanorocks_ros.cli.film_inputs import use_imports
-from nanorocks_ros.cli.remedies import with_own_files
-from nanorocks_ros.errors import ConfigurationError, NanorocksError
+from nanorocks_ros.cli.interrupts import Interrupts
 
+# All else is imported where an interruption is one line.
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Sequence
+
+    from nanorocks_ros.cli.parsing.command_parser import CommandParser
 
 EXIT_INPUT = 1
 EXIT_CALL = 2
@@ -23,44 +21,66 @@ EXIT_INTERRUPTED = 130
 _NO_MEMORY = (
     'the memory is full; close other programs, pass fewer --workers, or take a machine with more'
 )
+_TOO_DEEP = 'an input is nested too deeply; check where it comes from'
 
 
 COMMANDS = {
-    'analyse': 'analyse',
-    'autocorrelation': 'autocorrelation',
-    'calibrate': 'calibration.calibrate',
-    'calibrate-area': 'calibration.calibrate_area',
-    'cluster-curve': 'calibration.cluster_curve',
-    'dashboard': 'dashboard',
-    'doctor': 'doctor',
-    'figure': 'figures.figure',
-    'import': 'recordings.import_video',
-    'info': 'recordings.info',
-    'library': 'calibration.library',
-    'look': 'look',
-    'measure': 'films.measure',
-    'reproduce': 'reproduce',
-    'salvage': 'recordings.salvage',
-    'simulate': 'simulation.simulate',
-    'speeds': 'speeds',
-    'statistics': 'statistics',
-    'sweep': 'simulation.sweep',
-    'track': 'films.track',
-    'tray': 'films.tray',
+    'measure': {
+        'measure': 'films.measure',
+        'tray': 'films.tray',
+        'track': 'films.track',
+        'analyse': 'analyse',
+        'statistics': 'statistics',
+        'speeds': 'speeds',
+        'autocorrelation': 'autocorrelation',
+    },
+    'simulate': {
+        'simulate': 'simulation.simulate',
+        'sweep': 'simulation.sweep',
+        'library': 'calibration.library',
+        'cluster-curve': 'calibration.cluster_curve',
+        'reproduce': 'reproduce',
+    },
+    'draw': {
+        'figure': 'figures.figure',
+        'look': 'look',
+    },
+    'prepare recordings': {
+        'import': 'recordings.import_video',
+        'info': 'recordings.info',
+        'salvage': 'recordings.salvage',
+        'calibrate': 'calibration.calibrate',
+        'calibrate-area': 'calibration.calibrate_area',
+    },
+    'look after the machine': {
+        'dashboard': 'dashboard',
+        'doctor': 'doctor',
+        'completion': 'parsing.completion',
+    },
 }
-"""By command, the module of `nanorocks_ros.cli` that adds its parser; in the order of the help."""
+"""By task and command, the module of `nanorocks_ros.cli` that adds its parser; as in the help."""
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> CommandParser:
     """The parser of all commands; heavy imports wait until a command runs."""
-    parser = argparse.ArgumentParser(
+    from importlib import import_module
+
+    from nanorocks_ros import __version__
+    from nanorocks_ros.cli.parsing.command_parser import CommandParser
+
+    parser = CommandParser(
         prog='nanorocks',
         description='Coefficient of restitution, with its interval, from films of granular gases.',
+        epilog='The options of a command: nanorocks COMMAND --help',
     )
     parser.add_argument('--version', action='version', version=f'nanorocks {__version__}')
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
-    for module in COMMANDS.values():
-        import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
+    for modules in COMMANDS.values():
+        for module in modules.values():
+            import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
+    parser.group_commands(COMMANDS)
+    # What completes them is made of all commands.
+    parser.set_defaults(parser=parser)
     return parser
 
 
@@ -73,6 +93,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 after success, 1 for unusable input, 2 for a wrong call, 3 when done with a result that
         cannot be used, 130 when interrupted.
     """
+    options = None
+    with Interrupts() as interrupts:
+        try:
+            _set_up()
+            options = build_parser().parse_args(arguments)
+            return _run(options)
+        except KeyboardInterrupt as interruption:
+            return _interrupted(str(interruption))
+        except Exception as error:
+            if interrupts.seen:
+                return _interrupted('')
+            return _failed(error, options)
+
+
+def _set_up() -> None:
+    import logging
+
     # Set before numpy is loaded: arrays here are too small for a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     # Progress messages of the package; of other packages only warnings.
@@ -80,38 +117,46 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger('nanorocks_ros').setLevel(logging.INFO)
     # Its messages about missing fonts are of no use to the user.
     logging.getLogger('matplotlib.font_manager').setLevel(logging.ERROR)
-    options = None
-    try:
-        options = build_parser().parse_args(arguments)
-        use_imports(options)
-        code: int = options.run(options)
-    except ConfigurationError as error:
-        print(f'nanorocks: {with_own_files(str(error), options)}', file=sys.stderr)
-        return EXIT_CALL
-    except NanorocksError as error:
-        print(f'nanorocks: {with_own_files(str(error), options)}', file=sys.stderr)
-        return EXIT_INPUT
-    except KeyboardInterrupt as interruption:
-        message = str(interruption) or 'files written so far can be read'
-        print(f'nanorocks: interrupted; {message}', file=sys.stderr)
-        return EXIT_INTERRUPTED
-    except BrokenPipeError:
+
+
+def _run(options: argparse.Namespace) -> int:
+    from nanorocks_ros.cli.film_inputs import use_imports
+
+    use_imports(options)
+    code: int = options.run(options)
+    return code
+
+
+def _interrupted(message: str) -> int:
+    _say(f'interrupted; {message or "files written so far can be read"}')
+    return EXIT_INTERRUPTED
+
+
+def _failed(error: Exception, options: argparse.Namespace | None) -> int:
+    """Say in one line what is wrong; the exit code. Errors of the program are raised again."""
+    from nanorocks_ros.cli.remedies import with_own_files
+    from nanorocks_ros.errors import ConfigurationError, NanorocksError
+
+    if isinstance(error, BrokenPipeError):
         # The reader of the output closed the pipe.
         sys.stderr.close()
         return 0
-    except MemoryError:
-        print(f'nanorocks: {_NO_MEMORY}', file=sys.stderr)
-        return EXIT_INPUT
-    except RecursionError:
-        print(
-            'nanorocks: an input is nested too deeply; check where it comes from', file=sys.stderr
-        )
-        return EXIT_INPUT
-    except OSError as error:
+    if isinstance(error, NanorocksError):
+        _say(with_own_files(str(error), options))
+        return EXIT_CALL if isinstance(error, ConfigurationError) else EXIT_INPUT
+    if isinstance(error, MemoryError):
+        _say(_NO_MEMORY)
+    elif isinstance(error, RecursionError):
+        _say(_TOO_DEEP)
+    elif isinstance(error, OSError):
         from nanorocks_ros.outputs.safe_text import printable
 
         where = '' if error.filename is None else f'{printable(str(error.filename))}: '
-        message = f'{where}{error.strerror or error}'
-        print(f'nanorocks: {message}; free some space, or write elsewhere', file=sys.stderr)
-        return EXIT_INPUT
-    return code
+        _say(f'{where}{error.strerror or error}; free some space, or write elsewhere')
+    else:
+        raise error
+    return EXIT_INPUT
+
+
+def _say(line: str) -> None:
+    print(f'nanorocks: {line}', file=sys.stderr)

@@ -1,32 +1,86 @@
-"""Remedies that can be pasted: commands in them repeat the user's own files."""
+"""Remedies that can be pasted: commands in them repeat the user's own files and options."""
 
 from __future__ import annotations
 
 import re
 import shlex
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import argparse
 
 # Commands in remedies that describe a tray by its number alone.
-_COMMAND = re.compile(r'nanorocks (?:library|cluster-curve|simulate) --tray \d+')
+_BY_NUMBER = re.compile(r'nanorocks (?:library|cluster-curve|simulate) --trays? \d+')
+# Commands in remedies that name no recording.
+_ON_RECORDING = re.compile(r'nanorocks (look|speeds|track|measure|statistics) (?:BAG|FILM)\b')
+# What describes a recording on the command line: the flag by the name of its value.
+_DESCRIPTION = {
+    'trays': '--trays',
+    'trays_file': '--trays-file',
+    'parameters': '--parameters',
+    'image_topic': '--image-topic',
+    'preprocess.calibration': '--preprocess-calibration',
+    'preprocess.pixels_per_metre': '--preprocess-pixels-per-metre',
+}
+# The same of a film, for the commands that take it.
+_FILM = {
+    name: f'--{name.replace("_", "-")}'
+    for name in (
+        'diameter_px',
+        'diameter_mm',
+        'count',
+        'look',
+        'colour',
+        'density_g_cm3',
+        'corners',
+        'sides_mm',
+        'height_mm',
+    )
+}
+_TAKE_FILMS = 'track', 'measure'
 
 
 def with_own_files(text: str, options: argparse.Namespace | None) -> str:
-    """A message whose commands have the trays file of the user.
+    """A message whose commands have the recording, the trays file and the options of the user.
 
     Parameters
     ----------
     text : str
-        Of an error.
+        Of an error or a notice.
     options : Namespace or None
         Of the command; None while they are not known.
     """
-    trays_file = getattr(options, 'trays_file', None) or ''
-    if not trays_file or '\n' in trays_file:
+    if options is None:
         return text
-    return _COMMAND.sub(
-        lambda match: f'{match[0]} --trays-file {shlex.quote(trays_file)}',
-        text,
-    )
+    trays_file = _words(options, {'trays_file': '--trays-file'})
+    text = _BY_NUMBER.sub(lambda match: shlex.join([*match[0].split(), *trays_file]), text)
+    named: list[str] = getattr(options, 'named', [])
+    if len(named) != 1:
+        return text
+    return _ON_RECORDING.sub(lambda match: _on_recording(match[1], named[0], options), text)
+
+
+def results_beside(recording: str, kind: str) -> str:
+    """A folder for results of a recording, in the folder where the user is."""
+    return f'{Path(recording).stem or "film"}_{kind}'
+
+
+def _on_recording(command: str, recording: str, options: argparse.Namespace) -> str:
+    flags = {**_DESCRIPTION, **_FILM} if command in _TAKE_FILMS else _DESCRIPTION
+    words = ['nanorocks', command, recording, *_words(options, flags)]
+    if command == 'measure':
+        words += ['-o', results_beside(recording, 'measured')]
+    return shlex.join(words)
+
+
+def _words(options: argparse.Namespace, flags: dict[str, str]) -> list[str]:
+    """The options that the user gave, as words of a command line."""
+    words = []
+    for name, flag in flags.items():
+        value: Any = getattr(options, name, None)
+        values = [str(part) for part in (value if isinstance(value, list | tuple) else [value])]
+        # A described film is a trays file whose text stands in place of its name.
+        if value and not any('\n' in part for part in values):
+            words += [flag, *values]
+    return words

@@ -34,14 +34,11 @@ _POLL = 1.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    import argparse
-
     parser = commands.add_parser(
         'reproduce',
         help=_TEXT,
         description=_TEXT,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('-o', '--output', required=True, help='folder for films and report')
     parser.add_argument('--quick', action='store_true', help='one cycle of each kind, few runs')

@@ -54,13 +54,16 @@ def load_trays(path: str | Path | None = None) -> dict[int, Tray]:
     ConfigurationError
         When the file cannot be read or an entry cannot be used; names the line.
     """
+    is_flight = path is None or str(path) == ''
+    name = 'trays.yaml' if is_flight else shown_name(str(path), 'trays file')
+    return _TrayFile(name).trays(parse_yaml(name, trays_text(path)))
+
+
+def trays_text(path: str | Path | None = None) -> str:
+    """The content of a file of trays, as of `load_trays`."""
     if path is None or str(path) == '':
-        name = 'trays.yaml'
-        text = resources.files(__package__).joinpath(name).read_text(encoding='utf-8')
-    else:
-        name = shown_name(path, 'trays file')
-        text = file_content(path, 'a readable YAML file of trays')
-    return _TrayFile(name).trays(parse_yaml(name, text))
+        return resources.files(__package__).joinpath('trays.yaml').read_text(encoding='utf-8')
+    return file_content(path, 'a readable YAML file of trays')
 
 
 def tray_values(tray: Tray) -> dict[str, Any]:

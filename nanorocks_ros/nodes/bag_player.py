@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, RecordingError
 from nanorocks_ros.nodes.base.node import NanorocksNode
@@ -17,6 +16,7 @@ from nanorocks_ros.nodes.sources.bag_publishers import BagPublishers, stamp_in
 from nanorocks_ros.nodes.sources.bag_source import path_of_bag
 from nanorocks_ros.nodes.sources.play_range import PlayRange
 from nanorocks_ros.nodes.sources.player import Player
+from nanorocks_ros.nodes.sources.player_services import PlayerServices
 from nanorocks_ros.recordings.bag.played_range import latched_messages
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.image_messages import (
@@ -75,7 +75,9 @@ class BagPlayerNode(NanorocksNode):
         if playback.paused:
             self._player.pause()
         self.create_timer(_CLOCK_S, self._publish_clock, clock=self.steady_clock)
-        self._offer_services()
+        PlayerServices(self, self._player, self._range, self._is_step)
+        self.add_on_set_parameters_callback(self._check_change)
+        self.add_post_set_parameters_callback(self._apply_change)
 
     def _begin_ns(self, position: float) -> int:
         # The default is 0, and the range may begin later.
@@ -169,52 +171,11 @@ class BagPlayerNode(NanorocksNode):
         self.diagnostics.values['position [s]'] = f'{self._range.seconds(now_ns):.3f}'
         self.diagnostics.values['paused'] = str(self._player.paused).lower()
 
-    # Services and parameters
+    def _is_step(self, message: BagMessage | None) -> bool:
+        """Whether a message is a frame, or any message of a bag without frames."""
+        return message is not None and (not self._camera or message.topic in self._camera)
 
-    def _offer_services(self) -> None:
-        services = {
-            'pause': self._pause,
-            'resume': self._resume,
-            'toggle_paused': self._toggle_paused,
-            'is_paused': self._is_paused,
-            'play_next': self._play_next,
-        }
-        for name, service in services.items():
-            self.create_service(Trigger, f'~/{name}', service)
-        self.add_on_set_parameters_callback(self._check_change)
-        self.add_post_set_parameters_callback(self._apply_change)
-
-    def _answer(self, response: Trigger.Response, *, success: bool = True) -> Trigger.Response:
-        response.success = success
-        position = f'{self._range.seconds(self._player.now_ns):.3f} s'
-        response.message = f'{"paused" if self._player.paused else "playing"} at {position}'
-        return response
-
-    def _pause(self, _: object, response: Trigger.Response) -> Trigger.Response:
-        self._player.pause()
-        return self._answer(response)
-
-    def _resume(self, _: object, response: Trigger.Response) -> Trigger.Response:
-        self._player.resume()
-        return self._answer(response)
-
-    def _toggle_paused(self, request: object, response: Trigger.Response) -> Trigger.Response:
-        toggle = self._resume if self._player.paused else self._pause
-        return toggle(request, response)
-
-    def _is_paused(self, _: object, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, success=self._player.paused)
-
-    def _play_next(self, _: object, response: Trigger.Response) -> Trigger.Response:
-        """Play up to the next frame of the camera, or the next message without a camera."""
-        if not self._player.paused:
-            response.message = 'playing; pause first'
-            return response
-
-        def is_last(message: BagMessage | None) -> bool:
-            return message is not None and (not self._camera or message.topic in self._camera)
-
-        return self._answer(response, success=self._player.step(is_last))
+    # Parameters
 
     def _check_change(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

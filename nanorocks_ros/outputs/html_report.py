@@ -5,33 +5,25 @@ from __future__ import annotations
 import base64
 import html
 import math
+import re
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
+from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.command_line import command_line, program_name
+from nanorocks_ros.outputs.report_style import STYLE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 _TYPES = {'.png': 'image/png', '.jpg': 'image/jpeg'}
-_STYLE = """\
-:root { color-scheme: light dark; --line: #8884; --soft: #8882; --link: #1f6feb; }
-body { font: 16px/1.55 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
-  padding: 0 1rem; }
-h1 { font-size: 1.7rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; }
-h2, nav { border-top: 1px solid var(--line); padding-top: 1rem; }
-nav ol { columns: 2 18rem; } a { color: var(--link); }
-figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; background: #fff; }
-figcaption, caption { color: #777; font-size: .92rem; text-align: left; padding: .3rem 0; }
-.table { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .92rem; margin: 1rem 0; }
-th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: left;
-  vertical-align: top; }
-th { background: var(--soft); } td { font-variant-numeric: tabular-nums; }
-.errs { border-left: 4px solid #c23b22; padding-left: .8rem; }
-"""
+# A cell that begins so holds numbers, which stay in one line up to this length.
+_NUMBER = re.compile(r'[-+−–]?(\d|–$)')
+_LONGEST_NUMBER = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,14 +80,20 @@ class Section:
     parts: list[str | Table | Picture | Erratum] = field(default_factory=list)
 
 
-def write_report(path: Path, title: str, summary: str, sections: Sequence[Section]) -> None:
-    """Write the report, complete or not at all.
+def write_report(
+    path: Path, title: str, conclusion: str, sections: Sequence[Section], made: str = ''
+) -> None:
+    """Write the report, complete or not at all: the conclusion first, then how it was made.
 
     Parameters
     ----------
     path : Path
-    title, summary : str
+    title : str
+    conclusion : str
+        What follows from the report, in one paragraph.
     sections : sequence of Section
+    made : str, optional
+        Date, version and command; those of now and of this process if not given.
 
     Raises
     ------
@@ -115,8 +113,9 @@ def write_report(path: Path, title: str, summary: str, sections: Sequence[Sectio
     page = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<title>{html.escape(title)}</title><style>{_STYLE}</style></head><body>\n'
-        f'<h1>{html.escape(title)}</h1><p>{html.escape(summary)}</p>'
+        f'<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>\n'
+        f'<h1>{html.escape(title)}</h1><p class="conclusion">{html.escape(conclusion)}</p>'
+        f'<p class="made">{html.escape(made or made_line())}</p>'
         f'<nav><ol>{contents}</ol></nav>\n{body}</body></html>\n'
     )
     with atomic_file(path) as part:
@@ -133,16 +132,34 @@ def _part(part: str | Table | Picture | Erratum) -> str:
     return f'<p>{html.escape(part)}</p>\n'
 
 
+def made_line(command: str = '') -> str:
+    """Date, version and command of a report.
+
+    Parameters
+    ----------
+    command : str, optional
+        That of this process if not given.
+    """
+    told = command or command_line() or program_name()
+    date = datetime.now(UTC).strftime('%Y-%m-%d %H:%M UTC')
+    return f'Made on {date} with nanorocks_ros {__version__} by `{told}`.'
+
+
 def _table(table: Table) -> str:
     head = ''.join(f'<th scope="col">{html.escape(cell)}</th>' for cell in table.head)
-    rows = ''.join(
-        '<tr>' + ''.join(f'<td>{html.escape(cell)}</td>' for cell in row) + '</tr>\n'
-        for row in table.rows
-    )
-    caption = f'<caption>{html.escape(table.caption)}</caption>' if table.caption else ''
+    rows = ''.join('<tr>' + ''.join(_cell(cell) for cell in row) + '</tr>\n' for row in table.rows)
+    # Outside of the part that scrolls: a caption as wide as a wide table is cut on a phone.
+    caption = f'<figcaption>{html.escape(table.caption)}</figcaption>' if table.caption else ''
     return (
-        f'<div class="table"><table>{caption}<thead><tr>{head}</tr></thead>'
-        f'<tbody>{rows}</tbody></table></div>\n'
+        f'<figure>{caption}<div class="scroll" tabindex="0"><table><thead><tr>{head}</tr></thead>'
+        f'<tbody>{rows}</tbody></table></div></figure>\n'
+    )
+
+
+def _cell(cell: str) -> str:
+    is_number = len(cell) <= _LONGEST_NUMBER and _NUMBER.match(cell)
+    return (
+        f'<td class="n">{html.escape(cell)}</td>' if is_number else f'<td>{html.escape(cell)}</td>'
     )
 
 
@@ -156,7 +173,7 @@ def _picture(picture: Picture) -> str:
     kind = _TYPES[picture.path.suffix]
     caption = html.escape(picture.caption)
     return (
-        f'<figure><img alt="{caption}" src="data:{kind};base64,{content}">'
+        f'<figure class="picture"><img alt="{caption}" src="data:{kind};base64,{content}">'
         f'<figcaption>{caption}</figcaption></figure>\n'
     )
 

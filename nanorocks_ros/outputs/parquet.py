@@ -5,7 +5,6 @@ Tested by ``test/studies/synthetic/test_trajectory.py``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -20,25 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.outputs.table_columns import Column
+
 # Rows written together, at least, unless there are no more.
 _GROUP_ROWS = 1 << 16
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
-    """A column of a table.
-
-    Parameters
-    ----------
-    name : str
-    kind : str
-        ``i4``, ``f8`` or ``text``.
-    unit : str
-    """
-
-    name: str
-    kind: str
-    unit: str = ''
 
 
 def check_parquet(path: Path) -> None:
@@ -81,10 +65,20 @@ def write_parquet(
     arrow = _pyarrow('pyarrow', path)
     writer_of = _pyarrow('pyarrow.parquet', path).ParquetWriter
     text = arrow.dictionary(arrow.int32(), arrow.string())
-    kinds = {'i4': arrow.int32(), 'f8': arrow.float64(), 'text': text}
+    kinds = {
+        'int32': arrow.int32(),
+        'int64': arrow.int64(),
+        'float64': arrow.float64(),
+        'bool': arrow.bool_(),
+        'string': text,
+    }
     schema = arrow.schema(
         [
-            arrow.field(column.name, kinds[column.kind], metadata={'unit': column.unit})
+            arrow.field(
+                column.name,
+                kinds[column.kind],
+                metadata={'unit': column.unit, 'description': column.doc},
+            )
             for column in columns
         ],
         metadata={'provenance': provenance},

@@ -40,6 +40,7 @@ from nanorocks_ros.records.restitution_estimates import CorEstimate as CorEstima
 from nanorocks_ros.records.simulation_truth import BeadsTruth as BeadsTruth
 from nanorocks_ros.records.simulation_truth import GroundTruth as GroundTruth
 from nanorocks_ros.records.speed_estimates import SpeedEstimate as SpeedEstimate
+from nanorocks_ros.records.values import ONE_SIGMA as ONE_SIGMA
 from nanorocks_ros.records.values import UNKNOWN_INTERVAL as UNKNOWN_INTERVAL
 from nanorocks_ros.records.values import UNKNOWN_MEASURED as UNKNOWN_MEASURED
 from nanorocks_ros.records.values import UNKNOWN_MEASURED_INTERVAL as UNKNOWN_MEASURED_INTERVAL

@@ -108,6 +108,10 @@ class CorEstimate:
         none do.
     body_rebounds : int
         Of `rebounds`, those of bodies of several beads.
+    restitution_lower_68, restitution_upper_68 : float
+        Ends of the interval of `restitution` with the probability `ONE_SIGMA`.
+    wall_restitution_lower_68, wall_restitution_upper_68 : float
+        The same of `wall_restitution`.
     """
 
     stamp_ns: int
@@ -152,3 +156,7 @@ class CorEstimate:
     wall_impact_restitution: Interval = UNKNOWN_INTERVAL
     onset: float = UNKNOWN
     body_rebounds: int = 0
+    restitution_lower_68: float = UNKNOWN
+    restitution_upper_68: float = UNKNOWN
+    wall_restitution_lower_68: float = UNKNOWN
+    wall_restitution_upper_68: float = UNKNOWN

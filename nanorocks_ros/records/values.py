@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 from nanorocks_ros.records.quality_flags import UNKNOWN
 
+ONE_SIGMA = 0.6827
+"""Probability of an interval from one standard deviation below to one above, if normal."""
+
 
 @dataclass(frozen=True, slots=True)
 class Measured:

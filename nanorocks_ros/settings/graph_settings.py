@@ -115,19 +115,29 @@ class DashboardSettings:
     host: str = setting(
         '127.0.0.1',
         'address to listen on; an address that other machines can reach requires a token',
+        everyday=True,
+        placeholder='ADDRESS',
     )
-    port: int = setting(8321, 'port to listen on; 0: any free port', low=0, high=65535)
+    port: int = setting(
+        8321, 'port to listen on; 0: any free port', everyday=True, low=0, high=65535
+    )
     token: str = setting(
         '',
         'access token for browsers, 12 characters or more; empty: the environment variable '
         'NANOROCKS_DASHBOARD_TOKEN; without it, none on a loopback address, and a random printed '
         'token on others',
+        everyday=True,
+        placeholder='TOKEN',
     )
     certificate: str = setting(
-        '', 'PEM file of the certificate chain, to serve the page by HTTPS; empty: by HTTP'
+        '',
+        'PEM file of the certificate chain, to serve the page by HTTPS; empty: by HTTP',
+        placeholder='PEM',
     )
     private_key: str = setting(
-        '', 'PEM file of the private key of the certificate; empty: it is in the same file'
+        '',
+        'PEM file of the private key of the certificate; empty: it is in the same file',
+        placeholder='PEM',
     )
     picture_rate: float = setting(
         8.0, 'largest rate of images of a tray per browser', '1/s', low=0.1, high=30.0

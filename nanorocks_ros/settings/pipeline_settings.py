@@ -37,8 +37,12 @@ class PreprocessSettings:
         '',
         'calibration file with lens, regions and scale; it replaces `regions_px`, `layout`, '
         '`pixels_per_metre` and camera_info; empty: none',
+        everyday=True,
+        placeholder='YAML',
     )
-    pixels_per_metre: float = setting(13500.0, 'image scale', 'px/m', low=1.0, high=1e9)
+    pixels_per_metre: float = setting(
+        13500.0, 'image scale', 'px/m', everyday=True, low=1.0, high=1e9
+    )
     gray_mix: tuple[float, ...] = setting(
         (0.45, 0.45, 0.10), 'weights of blue, green and red in the gray mix', low=0.0, high=1.0
     )
@@ -211,6 +215,7 @@ class ClusterSettings:
         '',
         'file with the relation of cluster size to level area, made by `nanorocks '
         'cluster-curve`; empty: the file in the package for the tray',
+        placeholder='NPZ',
     )
 
 
@@ -239,8 +244,15 @@ class BodySettings:
 class PipelineSettings:
     """The settings of the whole data path."""
 
-    trays: tuple[int, ...] = setting((1,), 'trays to analyse', low=1, high=8, whole=True)
-    trays_file: str = setting('', 'YAML file of trays; empty: the trays of the flight')
+    trays: tuple[int, ...] = setting(
+        (1,), 'trays to analyse', everyday=True, placeholder='K', low=1, high=8, whole=True
+    )
+    trays_file: str = setting(
+        '',
+        'YAML file of trays; empty: the trays of the flight',
+        everyday=True,
+        placeholder='YAML',
+    )
     preprocess: PreprocessSettings = field(default_factory=PreprocessSettings)
     speed: SpeedSettings = field(default_factory=SpeedSettings)
     tracking: TrackingSettings = field(default_factory=TrackingSettings)

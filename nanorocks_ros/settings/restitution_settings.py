@@ -40,6 +40,7 @@ class CoolingSettings:
         '',
         'file of simulated decays, made by `nanorocks library`; empty: the file in the package '
         'for the tray',
+        placeholder='NPZ',
     )
     delay: float = setting(
         1.75, 'time from the shaking event to the first speed used', 's', low=0.0, high=600.0

@@ -7,10 +7,10 @@ import warnings
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 Scalar = bool | int | float | str
 
@@ -32,7 +32,16 @@ class Bounds:
     whole: bool = False
 
 
-def setting(default: Value, doc: str, unit: str = '', deprecated: str = '', **bounds: Any) -> Any:
+def setting(
+    default: Value,
+    doc: str,
+    unit: str = '',
+    *,
+    deprecated: str = '',
+    everyday: bool = False,
+    placeholder: str = '',
+    **bounds: Any,
+) -> Any:
     """A field of a settings class.
 
     Parameters
@@ -45,10 +54,21 @@ def setting(default: Value, doc: str, unit: str = '', deprecated: str = '', **bo
     deprecated : str
         Name of this setting in the previous release, without its group. It is accepted for one
         release, with a warning.
+    everyday : bool
+        Whether its flag is in the short help of commands.
+    placeholder : str
+        What stands for the value in the help of the flag; empty: the choices, or the unit.
     **bounds
         Fields of `Bounds`.
     """
-    metadata = {'doc': doc, 'unit': unit, 'deprecated': deprecated, 'bounds': Bounds(**bounds)}
+    metadata = {
+        'doc': doc,
+        'unit': unit,
+        'deprecated': deprecated,
+        'everyday': everyday,
+        'placeholder': placeholder,
+        'bounds': Bounds(**bounds),
+    }
     return field(default=default, metadata=metadata)
 
 
@@ -57,7 +77,8 @@ class SettingRow:
     """One setting, as the documentation, the ROS parameter and the flag need it.
 
     `name` and `deprecated`, the name in the previous release, include the group:
-    ``tracking.max_speed``. `deprecated` is empty for a setting that was not renamed.
+    ``tracking.max_speed``. `deprecated` is empty for a setting that was not renamed. Everyday
+    settings are in the short help; the placeholder is empty where choices or unit stand for it.
     """
 
     name: str
@@ -66,6 +87,8 @@ class SettingRow:
     unit: str
     bounds: Bounds
     deprecated: str = ''
+    everyday: bool = False
+    placeholder: str = ''
 
 
 def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
@@ -83,6 +106,8 @@ def rows(settings: Any, prefix: str = '') -> Iterator[SettingRow]:
                 unit=item.metadata['unit'],
                 bounds=item.metadata['bounds'],
                 deprecated=prefix + deprecated if deprecated else '',
+                everyday=item.metadata['everyday'],
+                placeholder=item.metadata['placeholder'],
             )
 
 
@@ -108,7 +133,7 @@ def problem(row: SettingRow, value: Any) -> str | None:
         if not isinstance(value, str):
             return f'{value!r} is not a text'
         if choices and value not in choices:
-            return f'{value!r} is none of {", ".join(choices)}'
+            return f'{value!r} is none of {", ".join(choices)}{_hint(value, choices)}'
         return None
     if isinstance(row.default, tuple):
         if isinstance(value, str):
@@ -118,6 +143,11 @@ def problem(row: SettingRow, value: Any) -> str | None:
     if isinstance(row.default, int) and isinstance(value, float) and not value.is_integer():
         return f'{value!r} is not a whole number'
     return _number_problem(value, row.bounds)
+
+
+def _hint(word: str, known: Iterable[str] | Mapping[str, str]) -> str:
+    hint = did_you_mean(word, known)
+    return f', {hint}' if hint else ''
 
 
 def _as_list(value: Any) -> list[Any]:
@@ -201,7 +231,9 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
     for message in messages:
         warnings.warn(message, FutureWarning, stacklevel=2)
     known = {row.name: row for row in rows(settings)}
-    problems = [f'no setting {name!r}' for name in values if name not in known]
+    # The group may be left out.
+    near = {name.rpartition('.')[2]: name for name in known} | {name: name for name in known}
+    problems = [f'no setting {name!r}{_hint(name, near)}' for name in values if name not in known]
     for name, value in values.items():
         text = problem(known[name], value) if name in known else None
         if text:

@@ -14,10 +14,10 @@ from nanorocks_ros.settings.setting_fields import setting
 class SimulationSettings:
     """A simulated tray and the camera over it."""
 
-    tray: int = setting(1, 'tray to simulate', low=1, high=8)
-    seed: int = setting(1, 'random seed', low=0, high=2**31 - 1)
+    tray: int = setting(1, 'tray to simulate', everyday=True, placeholder='K', low=1, high=8)
+    seed: int = setting(1, 'random seed', everyday=True, low=0, high=2**31 - 1)
     restitution: float = setting(
-        0.89, 'coefficient of restitution between beads', low=0.0, high=1.0
+        0.89, 'coefficient of restitution between beads', everyday=True, low=0.0, high=1.0
     )
     restitution_width: float = setting(
         0.0,
@@ -26,7 +26,7 @@ class SimulationSettings:
         high=1.0,
     )
     wall_restitution: float = setting(
-        0.99, 'coefficient of restitution at the walls', low=0.0, high=1.0
+        0.99, 'coefficient of restitution at the walls', everyday=True, low=0.0, high=1.0
     )
     restitution_law: str = setting(
         'constant',

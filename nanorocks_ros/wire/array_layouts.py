@@ -7,7 +7,7 @@ import math
 import re
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,12 @@ from nanorocks_ros.records import (
     StickingStatus,
 )
 from nanorocks_ros.wire.flat_records import flat_value, nested_fields
+from nanorocks_ros.wire.layout_fields import (
+    LayoutField,
+    array_elements,
+    exact_values,
+    rounded_elements,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,7 +39,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord
 
 
-_ENUMERATIONS = {
+ENUMERATIONS = {
     'method': SpeedMethod,
     'quality': Quality,
     'status': CorStatus,
@@ -42,25 +48,19 @@ _ENUMERATIONS = {
     'size_status': SizeStatus,
     'sticking_status': StickingStatus,
 }
+"""What the numbers of a field stand for, by the name of the field."""
 # By the type that a record declares.
 _WHOLE = {'int': int, 'bool': bool}
-# Fields of the array that a record keeps as an integer stamp.
-_STAMPS = {
+STAMPS = {
     'time': 'stamp_ns',
     'cycle_start': 'cycle_start_ns',
     'known': 'known_ns',
     'first_merge': 'first_merge_ns',
 }
-_FIELD = re.compile(r'^float32\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
-_CONSTANT = re.compile(r'^float32\s+([A-Z]\w*)\s*=\s*(\d+)$')
-
-
-class LayoutField(NamedTuple):
-    """One element of an array: its name, unit and meaning."""
-
-    name: str
-    unit: str
-    doc: str
+"""Fields that a record keeps as an integer stamp, and the names of the stamps."""
+_NUMBER = r'(u?int\d+|float\d+|bool)'
+_FIELD = re.compile(rf'^{_NUMBER}\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
+_CONSTANT = re.compile(rf'^{_NUMBER}\s+([A-Z]\w*)\s*=\s*(\d+)$')
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +74,7 @@ class Layout:
     doc : str
         First sentence of the definition.
     fields : tuple of LayoutField
+        The numbers of the definition.
     constants : dict of str to int
     """
 
@@ -83,9 +84,19 @@ class Layout:
     constants: dict[str, int]
 
     @property
+    def elements(self) -> tuple[LayoutField, ...]:
+        """The elements of the array: the fields, then the remainders of times."""
+        return array_elements(self.fields)
+
+    @property
+    def labels(self) -> list[str]:
+        """The names of the elements."""
+        return [element.name for element in self.elements]
+
+    @property
     def label(self) -> str:
-        """Comma-separated field names: ``layout.dim[0].label`` of the array."""
-        return ','.join(field.name for field in self.fields)
+        """The same, separated by commas: ``layout.dim[0].label`` of the array."""
+        return ','.join(self.labels)
 
 
 def layout(record_type: type[ArrayRecord]) -> Layout:
@@ -98,7 +109,7 @@ def _layout(name: str) -> Layout:
     text = resources.files(__package__).joinpath('msg', f'{name}.msg').read_text('utf-8')
     lines = [line.strip() for line in text.splitlines()]
     fields = [LayoutField(*match.groups()) for line in lines if (match := _FIELD.match(line))]
-    constants = [match.groups() for line in lines if (match := _CONSTANT.match(line))]
+    constants = [match.group(2, 3) for line in lines if (match := _CONSTANT.match(line))]
     return Layout(
         name=name,
         doc=lines[0].removeprefix('# '),
@@ -118,18 +129,44 @@ def to_array(record: ArrayRecord, epoch_ns: int) -> NDArray[np.float32]:
 
     Returns
     -------
-    ndarray of float32, (n_fields,)
+    ndarray of float32, (n_elements,)
         NaN where a value is not known.
     """
-    values = [_element(record, field.name, epoch_ns) for field in layout(type(record)).fields]
-    return np.array(values, dtype=np.float32)
+    fields = layout(type(record)).fields
+    return rounded_elements(fields, (field_value(record, field, epoch_ns) for field in fields))
 
 
-def _element(record: ArrayRecord, name: str, epoch_ns: int) -> float:
-    value = flat_value(record, _STAMPS.get(name, name))
+def field_value(record: ArrayRecord, field: LayoutField, epoch_ns: int) -> float:
+    """The number that a record holds in a field of its layout; NaN where it is not known.
+
+    Parameters
+    ----------
+    record : any of ArrayRecord
+    field : LayoutField
+    epoch_ns : int, [ns]
+        What `time` counts from.
+    """
+    name = field.name
+    value = flat_value(record, STAMPS.get(name, name))
     if value is None:
         return math.nan
-    return (value - epoch_ns) / NS if name in _STAMPS else float(value)
+    return (value - epoch_ns) / NS if name in STAMPS else float(value)
+
+
+def enumerated(record: ArrayRecord) -> dict[str, str | list[str]]:
+    """The words of the enumerations in a record, by the name of their field in typed messages.
+
+    ``status_name`` is the name of ``status`` in lower case, ``quality_names`` a list of flags.
+    """
+    words: dict[str, str | list[str]] = {}
+    for field in layout(type(record)).fields:
+        if field.name in ENUMERATIONS:
+            value = flat_value(record, field.name)
+            if isinstance(value, Quality):
+                words[f'{field.name}_names'] = value.names()
+            else:
+                words[f'{field.name}_name'] = value.name.lower()
+    return words
 
 
 def from_array(
@@ -157,20 +194,21 @@ def from_array(
     FrameError
         When the number of elements is not that of the layout or a stamp is missing.
     """
-    fields = layout(record_type).fields
-    if len(values) != len(fields):
+    fields, elements = layout(record_type).fields, layout(record_type).elements
+    if len(values) != len(elements):
         raise FrameError(
             where,
-            f'{len(values)} elements where {record_type.__name__} has {len(fields)}',
+            f'{len(values)} elements where {record_type.__name__} has {len(elements)}',
             'use the same release of nanorocks_ros on both sides',
         )
     if not math.isfinite(values[0]):
         raise FrameError(where, f'time is {values[0]}', 'publish the time in element 0')
     kinds = {field.name: field.type for field in dataclasses.fields(record_type)}
-    numbers = {field.name: float(value) for field, value in zip(fields, values, strict=True)}
+    exact = exact_values(fields, values).tolist()
+    numbers = {field.name: value for field, value in zip(fields, exact, strict=True)}
     items: dict[str, Any] = {'tray': tray, **nested_fields(record_type, numbers)}
     for name, number in numbers.items():
-        in_record = _STAMPS.get(name, name)
+        in_record = STAMPS.get(name, name)
         if in_record in items or in_record not in kinds:
             continue
         try:
@@ -186,8 +224,8 @@ def from_array(
 
 
 def _value(name: str, kind: object, value: float, epoch_ns: int) -> object:
-    if name in _STAMPS:
+    if name in STAMPS:
         return epoch_ns + round(value * NS) if math.isfinite(value) else None
     if kind in _WHOLE:
         return _WHOLE[kind](value)
-    return _ENUMERATIONS[name](int(value)) if name in _ENUMERATIONS else value
+    return ENUMERATIONS[name](int(value)) if name in ENUMERATIONS else value

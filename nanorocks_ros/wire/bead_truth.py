@@ -12,14 +12,19 @@ import numpy as np
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.records import NS, BeadsTruth
-from nanorocks_ros.wire.array_layouts import LayoutField
+from nanorocks_ros.wire.layout_fields import (
+    LayoutField,
+    array_elements,
+    exact_values,
+    rounded_elements,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-_FIELD = re.compile(r'^float32(\[\])?\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
+_FIELD = re.compile(r'^(float32|float64|int32)(\[\])?\s+([a-z]\w*)\s*#\s*\[([^\]]+)\]\s*(.*)$')
 
 
 class BeadsLayout(NamedTuple):
@@ -29,7 +34,7 @@ class BeadsLayout(NamedTuple):
     ----------
     doc : str
     head : tuple of LayoutField
-        Once, at the beginning.
+        Once, at the beginning; then the remainder of the time.
     bead : tuple of LayoutField
         Then for each bead.
     """
@@ -40,12 +45,10 @@ class BeadsLayout(NamedTuple):
 
     def dimensions(self, beads: int) -> tuple[tuple[str, int, int], ...]:
         """Label, size and stride of each ``layout.dim`` of an array with so many beads."""
-        head, bead = (
-            ','.join(field.name for field in fields) for fields in (self.head, self.bead)
-        )
-        row = len(self.bead)
+        elements, row = array_elements(self.head), len(self.bead)
+        head, bead = (','.join(field.name for field in fields) for fields in (elements, self.bead))
         return (
-            (head, len(self.head), len(self.head)),
+            (head, len(elements), len(elements)),
             ('bead', beads, beads * row),
             (bead, row, row),
         )
@@ -59,8 +62,8 @@ def beads_layout() -> BeadsLayout:
     fields = [match.groups() for line in lines if (match := _FIELD.match(line))]
     return BeadsLayout(
         lines[0].removeprefix('# '),
-        tuple(LayoutField(*field[1:]) for field in fields if not field[0]),
-        tuple(LayoutField(*field[1:]) for field in fields if field[0]),
+        tuple(LayoutField(kind, *field) for kind, many, *field in fields if not many),
+        tuple(LayoutField(kind, *field) for kind, many, *field in fields if many),
     )
 
 
@@ -75,7 +78,7 @@ def beads_to_array(truth: BeadsTruth, epoch_ns: int) -> NDArray[np.float32]:
 
     Returns
     -------
-    ndarray of float32, (6 + 9 n,)
+    ndarray of float32, (7 + 9 n,)
     """
     head = [
         (truth.stamp_ns - epoch_ns) / NS,
@@ -85,7 +88,7 @@ def beads_to_array(truth: BeadsTruth, epoch_ns: int) -> NDArray[np.float32]:
     ]
     columns = (truth.radii, truth.species, truth.bodies)
     rows = np.column_stack([truth.positions, truth.velocities, *columns])
-    return np.concatenate([head, rows.ravel()]).astype(np.float32)
+    return np.append(rounded_elements(beads_layout().head, head), rows.ravel().astype(np.float32))
 
 
 def beads_from_array(
@@ -108,7 +111,7 @@ def beads_from_array(
         When the elements are no whole beads, or a number that must be known is not finite.
     """
     layout = beads_layout()
-    first, row = len(layout.head), len(layout.bead)
+    first, row = len(array_elements(layout.head)), len(layout.bead)
     elements = np.asarray(values, dtype=np.float64)
     if elements.ndim != 1 or elements.size < first or (elements.size - first) % row:
         raise FrameError(
@@ -119,7 +122,8 @@ def beads_from_array(
     if not np.isfinite(elements).all():
         at = int(np.flatnonzero(~np.isfinite(elements))[0])
         raise FrameError(where, f'element {at} is {elements[at]}', 'publish finite numbers')
-    head, beads = elements[:first], elements[first:].reshape(-1, row)
+    head = exact_values(layout.head, elements[:first])
+    beads = elements[first:].reshape(-1, row)
     return BeadsTruth(
         stamp_ns=epoch_ns + math.floor(head[0] * NS + 0.5),
         tray=tray,

@@ -6,7 +6,7 @@ page and the sections of ``docs/reference/topics.md`` follow from `PRODUCTS`, in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeGuard
 
 from nanorocks_ros import records
@@ -89,6 +89,17 @@ _MEASURED_TYPES = frozenset(product.record for product in MEASURED)
 
 ARRAY_TOPICS: dict[type, Topic] = {product.record: product.topic for product in PRODUCTS}
 """The topic of each record that is published as an array."""
+
+TYPED_TOPICS = {
+    product.record: replace(
+        product.topic,
+        name=f'tray_{{tray}}/typed/{product.name}',
+        type=f'nanorocks_msgs/msg/{product.record.__name__}',
+        doc=f'{product.record.__name__} as a message of its own type',
+    )
+    for product in PRODUCTS
+}
+"""The topic of each of these records as a typed message, where `nanorocks_msgs` is installed."""
 
 CURVES = {product.record: product for product in PRODUCTS if product.curve}
 """The products that the live page draws, by record."""

@@ -32,7 +32,7 @@ def test_commands_on_a_bag_take_films(tmp_path, command):
 def test_a_pattern_names_films_and_bags(tmp_path):
     for name in ('b.avi', 'a.avi'):
         write_video(tmp_path / name, range(4))
-    options = build_parser().parse_args(['analyse', str(tmp_path / '*.avi')])
+    options = build_parser().parse_args(['analyse', str(tmp_path / '*.avi'), '--trays', '3'])
     use_imports(options)
     cache = tmp_path / '.nanorocks'
     assert options.bags == [str(cache / 'a.avi'), str(cache / 'b.avi')]
@@ -43,3 +43,13 @@ def test_what_is_no_film_is_left_to_the_reader_of_bags(tmp_path, capsys):
     assert main(['info', str(tmp_path / 'notes.txt')]) == 1
     assert main(['info', str(tmp_path / 'missing.avi')]) == 1
     assert 'Traceback' not in capsys.readouterr().err
+
+
+def test_a_film_of_unknown_beads_is_refused_before_it_is_imported(tmp_path, capsys):
+    film = write_video(tmp_path / 'my film.avi', range(4))
+    assert main(['analyse', str(film)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'does not say which trays it shows' in line
+    assert f"nanorocks measure '{film}' --diameter-px 31 -o 'my film_measured'" in line
+    assert f"nanorocks analyse '{film}' --trays 3" in line
+    assert not (tmp_path / '.nanorocks').exists()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import logging
 
 import pytest
 
 from nanorocks_ros.cli.flags import add_flags, settings_from
+from nanorocks_ros.cli.parsing.command_parser import CommandParser
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import PipelineSettings
 
@@ -15,7 +15,7 @@ WARNING = "'tracking.fastest' is now called 'tracking.max_speed'"
 
 
 def settings(*arguments, parameters=None):
-    parser = argparse.ArgumentParser()
+    parser = CommandParser()
     add_flags(parser, PipelineSettings(), skip=set())
     return settings_from(parser.parse_args(arguments), PipelineSettings(), parameters)
 
@@ -39,9 +39,9 @@ def test_a_current_flag_logs_nothing(caplog):
 
 
 def test_an_old_flag_does_not_appear_in_the_help():
-    parser = argparse.ArgumentParser()
+    parser = CommandParser()
     add_flags(parser, PipelineSettings(), skip=set())
-    text = parser.format_help()
+    text = parser.format_full_help()
     assert '--tracking-max-speed' in text
     assert '--tracking-fastest' not in text
 

@@ -62,7 +62,7 @@ def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
     assert speeds[-1].cycle == 1
     labels = arrays.messages[CorEstimate][0].layout.dim[0]
     assert labels.label == layout(CorEstimate).label
-    assert labels.size == len(layout(CorEstimate).fields)
+    assert labels.size == len(layout(CorEstimate).elements)
     names = {status.name for message in diagnostics for status in message.status}
     assert names >= {f'/nanorocks/{name}' for name in STAGES}
     keys = {

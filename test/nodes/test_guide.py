@@ -137,7 +137,7 @@ def test_the_guide_does_what_it_says(root, tmp_path, domain):
     quick = outputs['nanorocks measure film.avi --diameter-px 27 -o quick']
     assert re.search(r'15\.\d beads seen.*: usable', quick)
     assert re.search(r'walls, by rebounds alone: 0\.9\d+', quick)
-    measured = outputs['nanorocks measure film.avi --tray mine.yaml -o measured']
+    measured = outputs['nanorocks measure film.avi --trays-file mine.yaml -o measured']
     assert 'library: ' not in measured, 'the library of the package is of this tray'
     assert re.search(r'decay: cycle 1: COR 0\.\d+', measured)
     files = ('quick/report.html', 'measured/report.html', 'my_film_results/tray_1_cor.csv')

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 
 PERIOD, SIZE, PEAK = 60.0, 6e-4, 0.008
 TIMES = np.concatenate((np.linspace(0.1, 3.0, 10), np.linspace(5.0, 59.0, 20)))
@@ -44,5 +45,9 @@ def write_recording(folder, trays, cycles, sizes, *, peaks=None, bodies=False, s
         ):
             if rows:
                 names = fields.split()
-                write_csv(folder / f'tray_{number}_{name}.csv', names, ['1'] * len(names), rows)
+                write_csv(
+                    folder / f'tray_{number}_{name}.csv',
+                    float_columns(names, ['1'] * len(names)),
+                    rows,
+                )
     return folder

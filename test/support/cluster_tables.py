@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 
 
 def write_results(folder, areas, starts=(2.0, 62.0), period=60.0):
@@ -18,14 +19,14 @@ def write_results(folder, areas, starts=(2.0, 62.0), period=60.0):
     ]
     write_csv(
         folder / 'tray_1_cluster.csv',
-        ['time', 'cycle', 'level_area', 'correlation_length'],
-        ['s', '1', 'm^2', 'm'],
+        float_columns(
+            ['time', 'cycle', 'level_area', 'correlation_length'], ['s', '1', 'm^2', 'm']
+        ),
         rows,
     )
     write_csv(
         folder / 'tray_1_speed.csv',
-        ['time', 'cycle', 'cycle_start'],
-        ['s', '1', 's'],
+        float_columns(['time', 'cycle', 'cycle_start'], ['s', '1', 's']),
         [(0.0, 0.0, math.nan), *((start, n + 1, start) for n, start in enumerate(starts))],
     )
     return folder

@@ -8,6 +8,7 @@ import numpy as np
 from contact_draws import drawn_impact, drawn_rebound
 
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.records import (
     NS,
     CorEstimate,
@@ -24,7 +25,9 @@ def write_table(path, records):
     """A table as `nanorocks analyse` writes it."""
     fields = layout(type(records[0])).fields
     names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
-    write_csv(path, names, units, [to_array(record, 0).tolist() for record in records])
+    write_csv(
+        path, float_columns(names, units), [to_array(record, 0).tolist() for record in records]
+    )
 
 
 def contact_results(folder, law, *, contacts=150, seed=1, tray=1, late=0):

@@ -6,6 +6,7 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
@@ -23,7 +24,7 @@ FIELDS = {
 
 
 def write_rows(path, rows):
-    write_csv(path, list(FIELDS), list(FIELDS.values()), rows)
+    write_csv(path, float_columns(FIELDS, FIELDS.values()), rows)
     return path
 
 
@@ -69,5 +70,5 @@ def simulated_mixture(path, number, cycles, error=1e-4, restitution=0.89, speed=
     names = ['mean_projected_speed', 'first_species_speed', 'second_species_speed']
     fields = ['time', 'cycle', 'cycle_start', *(f'{a}{b}' for a in names for b in ('', '_error'))]
     units = ['s', '1', 's', *['m/s'] * 6, 's']
-    write_csv(path, [*fields, 'window'], units, rows)
+    write_csv(path, float_columns([*fields, 'window'], units), rows)
     return path

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import get_types_from_msg
 
 from nanorocks_ros.errors import FrameError
@@ -35,7 +36,7 @@ from nanorocks_ros.records import (
     StickingStatus,
     TrayState,
 )
-from nanorocks_ros.wire.array_layouts import from_array, layout, to_array
+from nanorocks_ros.wire.array_layouts import enumerated, from_array, layout, to_array
 from nanorocks_ros.wire.products import PRODUCTS
 
 DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'nanorocks_msgs' / 'msg'
@@ -204,7 +205,7 @@ RECORDS = (
 RECORDS += tuple(
     from_array(
         product.record,
-        np.ones(len(layout(product.record).fields)),
+        np.ones(len(layout(product.record).elements)),
         tray=1,
         epoch_ns=EPOCH,
         where='test',
@@ -231,7 +232,20 @@ def test_a_record_comes_back_from_its_array_to_float32_rounding(record):
         elif isinstance(before, Enum):
             assert after == before
         else:
-            assert after == pytest.approx(before, abs=200)
+            assert after == pytest.approx(before, abs=2)
+
+
+@pytest.mark.parametrize('days', [0, 1, 7, 365])
+def test_a_time_is_exact_however_long_ago_the_epoch(days):
+    stamp_ns = EPOCH + days * 86_400 * 10**9 + 123_456_789
+    speed = dataclasses.replace(RECORDS[0], stamp_ns=stamp_ns, cycle_start_ns=stamp_ns - 10**9)
+    values = to_array(speed, EPOCH)
+    back = from_array(SpeedEstimate, values, tray=3, epoch_ns=EPOCH, where='test')
+    assert abs(back.stamp_ns - stamp_ns) < 1000
+    assert abs(back.cycle_start_ns - speed.cycle_start_ns) < 1000
+    elements = dict(zip(layout(SpeedEstimate).labels, values.tolist(), strict=True))
+    in_array = elements['time'] + elements['time_remainder']
+    assert in_array == pytest.approx((stamp_ns - EPOCH) / 1e9, abs=1e-6)
 
 
 @pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
@@ -241,10 +255,36 @@ def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(
     parsed = get_types_from_msg(text, f'nanorocks_msgs/msg/{name}')
     constants, fields = parsed[f'nanorocks_msgs/msg/{name}']
     array = layout(type(record))
-    assert [field.name for field in array.fields] == [field for field, _ in fields]
-    assert array.label == ','.join(field for field, _ in fields)
+    kinds = {field: kind[1][0] for field, kind in fields if kind[0] == Nodetype.BASE}
+    numbers = {field: kind for field, kind in kinds.items() if kind != 'string'}
+    assert {field.name: field.number for field in array.fields} == numbers
+    assert [field.name for field in array.fields] == list(numbers)
+    exact = [field for field, kind in numbers.items() if kind == 'float64']
+    assert array.labels == [*numbers, *(f'{field}_remainder' for field in exact)]
+    assert array.label == ','.join(array.labels)
     assert array.constants == {key: int(value) for key, _, value in constants}
-    assert all(field.unit and field.doc for field in array.fields)
+    assert all(field.unit and field.doc for field in array.elements)
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
+def test_typed_messages_have_a_header_and_a_word_for_every_code(record):
+    name = type(record).__name__
+    text = (DEFINITIONS / f'{name}.msg').read_text()
+    _, fields = get_types_from_msg(text, f'nanorocks_msgs/msg/{name}')[
+        f'nanorocks_msgs/msg/{name}'
+    ]
+    assert fields[0] == ('header', (Nodetype.NAME, 'std_msgs/msg/Header'))
+    beside = {field for field, _ in fields[1:]} - {
+        field.name for field in layout(type(record)).fields
+    }
+    assert beside == set(enumerated(record))
+
+
+def test_codes_have_their_words():
+    assert enumerated(RECORDS[0]) == {
+        'method_name': 'binarised_area',
+        'quality_names': ['few_beads', 'glare'],
+    }
 
 
 @pytest.mark.parametrize('record', RECORDS, ids=lambda record: type(record).__name__)
@@ -298,7 +338,7 @@ def test_not_known_is_nan_and_never_zero():
 
 def test_an_array_of_another_release_is_refused():
     with pytest.raises(
-        FrameError, match=r'/speed: 3 elements where SpeedEstimate has 13; use the'
+        FrameError, match=r'/speed: 3 elements where SpeedEstimate has 15; use the'
     ):
         from_array(SpeedEstimate, [1.0, 2.0, 3.0], tray=1, epoch_ns=0, where='/speed')
 

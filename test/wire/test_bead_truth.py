@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import get_types_from_msg
 
 from nanorocks_ros.errors import FrameError
@@ -45,10 +46,11 @@ def test_the_layout_is_the_message_definition_as_an_independent_parser_reads_it(
     parsed = get_types_from_msg(DEFINITION.read_text(), 'nanorocks_msgs/msg/BeadsTruth')
     _, fields = parsed['nanorocks_msgs/msg/BeadsTruth']
     array = beads_layout()
-    # A field of an array has its element type within.
-    single = [name for name, kind in fields if not isinstance(kind[1], tuple) or kind[0] == 1]
-    assert [field.name for field in (*array.head, *array.bead)] == [name for name, _ in fields]
+    single = [name for name, kind in fields if kind[0] == Nodetype.BASE]
+    lists = [name for name, kind in fields if kind[0] == Nodetype.SEQUENCE]
+    assert [name for name, _ in fields] == ['header', *single, *lists]
     assert [field.name for field in array.head] == single
+    assert [field.name for field in array.bead] == lists
     assert all(field.unit and field.doc for field in (*array.head, *array.bead))
 
 
@@ -63,15 +65,15 @@ def test_the_dimensions_say_what_is_where():
 
 def test_arrays_that_hold_no_whole_beads_are_refused():
     values = beads_to_array(TRUTH, EPOCH)
-    with pytest.raises(FrameError, match='/beads: 50 elements are not 6 and 9 for each bead'):
+    with pytest.raises(FrameError, match='/beads: 51 elements are not 7 and 9 for each bead'):
         beads_from_array(values[:-1], tray=3, epoch_ns=0, where='/beads')
     with pytest.raises(FrameError, match='3 elements'):
         beads_from_array(values[:3], tray=3, epoch_ns=0, where='/beads')
-    values[7] = np.nan
-    with pytest.raises(FrameError, match='element 7 is nan'):
+    values[8] = np.nan
+    with pytest.raises(FrameError, match='element 8 is nan'):
         beads_from_array(values, tray=3, epoch_ns=0, where='/beads')
 
 
 def test_a_tray_without_beads_is_an_array_too():
-    values = beads_to_array(TRUTH, EPOCH)[:6]
+    values = beads_to_array(TRUTH, EPOCH)[:7]
     assert beads_from_array(values, tray=3, epoch_ns=EPOCH, where='test').radii.size == 0

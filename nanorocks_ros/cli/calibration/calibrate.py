@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.film_inputs import accept_films
+from nanorocks_ros.cli.parsing.tray_options import add_trays, add_trays_file
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import finite_or_none
 
@@ -37,10 +38,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '--image-topic', default='', help='camera topic; default: that of our nodes'
     )
-    parser.add_argument(
-        '--trays', type=int, nargs='+', metavar='K', help='trays on the plate; default: all'
-    )
-    parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
+    add_trays(parser, 'trays on the plate; default: all')
+    add_trays_file(parser)
     parser.add_argument(
         '--scale',
         type=float,

@@ -5,12 +5,14 @@ Tested by ``test/studies/libraries/test_cluster_simulations.py``.
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray, add_trays, add_trays_file
 from nanorocks_ros.outputs.json_values import finite_or_none
 
 if TYPE_CHECKING:
@@ -27,11 +29,10 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         'cluster-curve', help='calibrate cluster sizes with films of simulated clusters'
     )
-    parser.add_argument(
-        '--tray', type=int, action='append', help='number of a tray; may be repeated; default: all'
-    )
+    add_trays(parser, 'trays to film; default: all')
+    add_tray(parser, argparse.SUPPRESS, action='append')
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
-    parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
+    add_trays_file(parser)
     parser.add_argument('--runs', type=int, default=128, help='number of films; default 128')
     parser.add_argument(
         '--level',
@@ -108,7 +109,7 @@ def _plan(options: argparse.Namespace) -> ClusterPlan:
             f'give two rising numbers from 0 to {_MAX_STRENGTH:g}',
         )
     trays = load_trays(options.trays_file or None)
-    numbers = tuple(sorted(set(options.tray or trays)))
+    numbers = tuple(sorted({*options.trays, *(options.tray or ())} or set(trays)))
     for number in numbers:
         tray_by_number(trays, number)
     return ClusterPlan(

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray, add_trays_file
+
 if TYPE_CHECKING:
     import argparse
 
@@ -20,9 +22,9 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         'library', help='simulate the decays of a tray from which restitutions are inferred'
     )
-    parser.add_argument('--tray', type=int, required=True, help='number of the tray')
+    add_tray(parser, 'tray to simulate', required=True)
     parser.add_argument('-o', '--output', required=True, help='file to write, .npz')
-    parser.add_argument('--trays-file', default='', help='YAML file of trays; default: as flown')
+    add_trays_file(parser)
     parser.add_argument('--nodes', type=int, default=800, help='simulated points; default 800')
     parser.add_argument(
         '--rough-nodes',
@@ -50,6 +52,7 @@ def add_parser(commands: Any) -> None:
     add_flags(
         parser, settings, skipped, 'laws that are not constant; `analyse` needs constant ones'
     )
+    parser.leave_out('--rough-nodes', '--drag', '--scheduler')
     parser.set_defaults(run=run)
 
 

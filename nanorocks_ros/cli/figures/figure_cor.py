@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -30,18 +31,15 @@ _FIRST, _LAST = 1.75, 20.0
 
 def add_parser(kinds: Any) -> None:
     """Add the kind to those of ``nanorocks figure``."""
-    import argparse
-
     parser = kinds.add_parser(
         'cor',
         help=_TEXT,
         description=_TEXT,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('source', help='folder of results of `nanorocks analyse`, or a bag')
     parser.add_argument('-o', '--output', required=True, help='folder for the figures')
-    parser.add_argument('--tray', type=int, help='number of the tray; required with several trays')
+    add_tray(parser, 'number of the tray; required with several trays')
     parser.add_argument(
         '--runs', type=int, default=20, help='runs at each point of the search; default 20'
     )
@@ -75,6 +73,8 @@ def add_parser(kinds: Any) -> None:
         '--scheduler', metavar='tcp://HOST:PORT', help='scheduler of a Dask cluster'
     )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
+    parser.leave_out('--beads', '--walls', '--widths', '--first', '--last')
+    parser.leave_out('--parameters', '--scheduler')
     parser.set_defaults(run=run)
 
 
@@ -172,8 +172,12 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
 
 
 def _data(options: argparse.Namespace, source: Path) -> CorData:
-    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
+    from nanorocks_ros.experiment.trays import tray_by_number
+    from nanorocks_ros.studies.analysis.published_cycles import (
+        published_cycles,
+        published_lines,
+        truth_of,
+    )
     from nanorocks_ros.studies.decays.cooling_curves import (
         read_cycles,
         species_cycles,
@@ -181,11 +185,12 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
     )
     from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
     from nanorocks_ros.studies.figures.cor_figures import CorData
+    from nanorocks_ros.studies.results.results_provenance import trays_of_results
 
     table, number = speed_table(source, options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(load_trays(trays_file_of(table.parent)), number)
+    tray = tray_by_number(trays_of_results(table.parent), number)
     cycles = read_cycles(table)
     window = cooling_window(table)
     default_span = (window.first, window.last) if window else (_FIRST, _LAST)
@@ -200,6 +205,9 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
         span=span_of(options.first, options.last, default_span),
         start=window.start if window else 0.0,
         wall_restitution=options.wall_restitution,
+        published=tuple(
+            published_lines(published_cycles(table, number), truth_of(table.parent, number))
+        ),
     )
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray, add_trays_file
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -31,9 +32,7 @@ def add_parser(kinds: Any) -> None:
             'speeds', help='folder of results of `nanorocks analyse`, or a table of speeds'
         )
         parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-        parser.add_argument(
-            '--tray', type=int, help='number of the tray; required with several trays'
-        )
+        add_tray(parser, 'number of the tray; required with several trays')
         parser.add_argument(
             '--wall-restitution',
             type=float,
@@ -49,7 +48,7 @@ def add_parser(kinds: Any) -> None:
         parser.add_argument(
             '--last', type=float, help='[s] end of the fit; default 20, or as analysed'
         )
-        parser.add_argument('--trays', default='', help='YAML file of trays; default: as analysed')
+        add_trays_file(parser, 'as analysed')
         parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
         parser.add_argument('--force', action='store_true', help='replace a picture that exists')
         parser.set_defaults(run=run)
@@ -57,17 +56,17 @@ def add_parser(kinds: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, draw and print, and return the exit code."""
-    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.experiment.trays import tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
     from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
+    from nanorocks_ros.studies.results.results_provenance import trays_of_results
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(load_trays(options.trays or trays_file_of(table.parent)), number)
+    tray = tray_by_number(trays_of_results(table.parent, options.trays_file), number)
     cycles = read_cycles(table)
     values = _draw_figure(options, table, tray, cycles)
     if options.json:
@@ -82,6 +81,11 @@ def _draw_figure(
     options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
 ) -> dict[str, Any]:
     """Draw the picture, and return its numbers."""
+    from nanorocks_ros.studies.analysis.published_cycles import (
+        published_cycles,
+        published_lines,
+        truth_of,
+    )
     from nanorocks_ros.studies.decays.cooling_curves import cooling_part, species_cycles
     from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
     from nanorocks_ros.studies.figures.decay_figure import decay_figure
@@ -91,16 +95,27 @@ def _draw_figure(
     )
 
     path, walls = Path(options.output), options.wall_restitution
+    published = published_cycles(table, tray.number)
+    lines = published_lines(published, truth_of(table.parent, tray.number))
     window = cooling_window(table)
     start = window.start if window else 0.0
     default_span = (window.first, window.last) if window and start > 0.0 else _SPAN
     span = span_of(options.first, options.last, default_span)
     if options.kind == 'decay':
         species = species_cycles(table, tray)
-        return decay_figure(
-            path, tray, cycles, wall_restitution=walls, span=span, species=species, start=start
+        values = decay_figure(
+            path,
+            tray,
+            cycles,
+            wall_restitution=walls,
+            span=span,
+            species=species,
+            start=start,
+            published=lines,
         )
+        return {'published': lines, **values}
     cycles, span = cooling_part(cycles, span, start)
-    return instantaneous_values(
-        instantaneous_figure(path, tray, cycles, wall_restitution=walls, span=span)
+    cor = instantaneous_figure(
+        path, tray, cycles, wall_restitution=walls, span=span, published=lines
     )
+    return {'published': lines, **instantaneous_values(cor)}

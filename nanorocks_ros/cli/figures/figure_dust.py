@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_trays_file
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def add_parser(kinds: Any) -> None:
         default=0.89,
         help='restitution for the collapse time of a cloud; default 0.89',
     )
-    parser.add_argument('--trays', default='', help='YAML file of trays; default: as flown')
+    add_trays_file(parser)
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument('--force', action='store_true', help='replace a picture that exists')
     parser.set_defaults(run=run)
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
     factor = collapse_time_factor(options.restitution)
-    trays = load_trays(options.trays)
+    trays = load_trays(options.trays_file)
     measured = [_threshold(text, trays) for text in options.measured]
 
     from nanorocks_ros.studies.figures.dust_figure import dust_figure, paper_thresholds

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_tray
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -27,20 +28,17 @@ the values of the paper. Example:
 
 def add_parser(kinds: Any) -> None:
     """Add the kind to those of ``nanorocks figure``."""
-    import argparse
-
     parser = kinds.add_parser(
         'impacts',
         help=_TEXT,
         description=_TEXT,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         'results', nargs='+', help='folders of results of `nanorocks analyse`, of bags or a batch'
     )
     parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-    parser.add_argument('--tray', type=int, help='number of the tray; required with several trays')
+    add_tray(parser, 'number of the tray; required with several trays')
     parser.add_argument('--parameters', help='ROS parameter file with the priors')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument('--force', action='store_true', help='replace a picture that exists')

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_trays
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -27,11 +28,7 @@ def add_parser(kinds: Any) -> None:
         'results', nargs='?', help='folder of results of `nanorocks analyse`; not with --simulate'
     )
     parser.add_argument('-o', '--output', required=True, help='picture: .png, .pdf or .svg')
-    parser.add_argument(
-        '--trays',
-        metavar='K,K,...',
-        help='trays; default: all in the results, or 1,3,5 with --simulate',
-    )
+    add_trays(parser, 'trays; default: all in the results, or 1 3 5 with --simulate')
     parser.add_argument(
         '--simulate', action='store_true', help='simulate and film trays with sticking beads'
     )
@@ -72,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
             'both are given' if options.simulate else 'neither is given',
             'name results of `nanorocks analyse`, or pass --simulate',
         )
-    numbers = _numbers(options.trays)
+    numbers = options.trays
     if options.simulate:
         numbers = numbers or (1, 3, 5)
     else:
@@ -99,13 +96,6 @@ def _trays_file(results: str | None) -> str:
     from nanorocks_ros.studies.analysis.results_folder import trays_file_of
 
     return trays_file_of(Path(results)) if results else ''
-
-
-def _numbers(text: str | None) -> tuple[int, ...]:
-    words = [part.strip() for part in (text or '').split(',') if part.strip()]
-    if not all(word.isdigit() for word in words):
-        raise ConfigurationError('--trays', f'{text!r}', 'give numbers such as 1,3,5')
-    return tuple(dict.fromkeys(int(word) for word in words))
 
 
 def _read_curves(

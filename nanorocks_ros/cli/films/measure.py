@@ -26,7 +26,7 @@ _EPILOG = """\
 Examples:
 
   nanorocks measure film.mp4 --diameter-px 31 -o out
-  nanorocks measure film.mp4 --tray mine.yaml -o out
+  nanorocks measure film.mp4 --trays-file mine.yaml -o out
 
 The second knows the container (`nanorocks tray` writes the file), so that the decay of the speeds
 is read as well. The same command continues after an interruption, and takes finished steps from
@@ -36,33 +36,35 @@ the folder. Exit code 3: done, but the beads are not recognised well enough.
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.films.film_options import add_film_options
+    from nanorocks_ros.cli.films.film_options import add_film_options, leave_out_film_options
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser(
         'measure',
         help='measure a film: tracks, speeds, contacts, restitutions, one page',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_bag(parser)
     add_film_options(parser)
-    parser.add_argument('--tray', dest='trays_file', metavar='YAML', help='as --trays-file')
     parser.add_argument('-o', '--output', required=True, help='folder for the results')
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
+    leave_out_film_options(parser)
+    parser.leave_out('--trays', '--workers')
     parser.set_defaults(run=run)
 
 
 class _Terminal:
     """Lines and bars on the terminal; lines go to standard error where JSON is printed."""
 
-    def __init__(self, *, is_json: bool) -> None:
-        self._stream = sys.stderr if is_json else sys.stdout
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._options = options
+        self._stream = sys.stderr if options.json else sys.stdout
 
     def say(self, line: str) -> None:
+        from nanorocks_ros.cli.remedies import with_own_files
         from nanorocks_ros.outputs.safe_text import printable
 
-        print(printable(line), file=self._stream, flush=True)
+        print(printable(with_own_files(line, self._options)), file=self._stream, flush=True)
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Progress]:
@@ -90,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         describe=_described,
     )
     try:
-        measured = measure_film(plan, _Terminal(is_json=options.json))
+        measured = measure_film(plan, _Terminal(options))
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('the same command continues') from interruption
     if options.json:
@@ -113,13 +115,13 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
             options.named[0],
             'nothing is told of its beads',
             f'give their diameter in the picture: nanorocks measure {film} --diameter-px 31 -o '
-            f'{shlex.quote(options.output)}; or a file, as --tray mine.yaml',
+            f'{shlex.quote(options.output)}; or a file, as --trays-file mine.yaml',
         )
     print_notices(recorded.notices)
     return recorded
 
 
 def _described(analysis: Analysis, number: int) -> list[str]:
-    from nanorocks_ros.cli.analyse import tray_lines
+    from nanorocks_ros.studies.analysis.tray_words import tray_lines
 
     return tray_lines(analysis, analysis.trays[number])

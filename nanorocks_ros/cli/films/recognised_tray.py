@@ -36,9 +36,9 @@ def recognised_tray(options: argparse.Namespace, samples: FilmSamples) -> Recogn
     ConfigurationError
         For options that do not fit each other or the picture.
     """
-    from nanorocks_ros.cli.films.film_options import filmed_tray
     from nanorocks_ros.studies.measure.film_tray import described_tray
     from nanorocks_ros.studies.measure.seen_beads import seen_beads
+    from nanorocks_ros.studies.measure.told_film import filmed_tray
 
     guesses = _complete(options, samples)
     filmed = filmed_tray(options)

@@ -25,7 +25,7 @@ _PERCENT = 100.0
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.films.film_options import add_film_options
+    from nanorocks_ros.cli.films.film_options import add_film_options, leave_out_film_options
     from nanorocks_ros.cli.flags import add_bag
 
     parser = commands.add_parser('track', help='track all beads of a film or bag')
@@ -42,6 +42,8 @@ def add_parser(commands: Any) -> None:
         '--first-frame', type=int, default=0, help='number of the first frame in FILE; default 0'
     )
     parser.add_argument('--force', action='store_true', help='replace files that exist')
+    leave_out_film_options(parser)
+    parser.leave_out('--compare', '--first-frame', '--force')
     parser.set_defaults(run=run)
 
 
@@ -59,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(_as_json(bag, compared), allow_nan=False))
     else:
-        _print(bag, compared)
+        _print(bag, compared, options)
     _write(options, bag)
     return 0 if bag.usable else EXIT_NOT_USABLE
 
@@ -94,14 +96,22 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 def _write(options: argparse.Namespace, bag: TrackedBag) -> None:
     from nanorocks_ros.studies.analysis.tracks_files import write_tracks
-    from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
+    from nanorocks_ros.studies.inspection.track_overlay import (
+        MAGNIFICATION,
+        overlay,
+        with_scale_bar,
+        write_overlay,
+    )
 
     if options.output:
         write_tracks(Path(options.output), bag)
         print(f'nanorocks: tracks in {options.output}', file=sys.stderr)
     if options.picture:
         pictures = [
-            overlay(image, bag.tracks[number], bag.pixels_per_metre)
+            with_scale_bar(
+                overlay(image, bag.tracks[number], bag.pixels_per_metre),
+                MAGNIFICATION * bag.pixels_per_metre,
+            )
             for number, image in sorted(bag.pictures.items())
         ]
         write_overlay(Path(options.picture), pictures)
@@ -199,7 +209,11 @@ def _comparison_as_json(comparison: TrackComparison | None) -> dict[str, Any] | 
     return plain
 
 
-def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
+def _print(
+    bag: TrackedBag, compared: dict[int, TrackComparison], options: argparse.Namespace
+) -> None:
+    from nanorocks_ros.cli.remedies import with_own_files
+
     print(f'{bag.frames} frames')
     for number in bag.trays:
         print(f'tray {number}: {len(bag.tracks[number])} frames tracked')
@@ -207,7 +221,7 @@ def _print(bag: TrackedBag, compared: dict[int, TrackComparison]) -> None:
             print(f'  {row["material"]}: {_seen(row)}, {row["tracks"]} tracks')
         for verdict in bag.verdicts.get(number, ()):
             for line in verdict.lines():
-                print(f'  {line}')
+                print(f'  {with_own_files(line, options)}')
         if number in compared:
             _print_comparison(compared[number])
 

@@ -36,7 +36,6 @@ def add_parser(commands: Any) -> None:
         'tray',
         help='describe beads and container of a film in a trays file',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('bag', metavar='FILM', help='video, folder of images or bag')
     accept_films(parser, 'bag')
@@ -61,6 +60,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--image-topic', default='', help='camera topic of a bag')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.leave_out('--look', '--colour', '--density-g-cm3', '--image-topic', '--json', '--force')
     parser.set_defaults(run=run, trays_file='')
 
 
@@ -110,5 +110,5 @@ def _print(options: argparse.Namespace, beads: SeenBeads) -> None:
         for row in rows:
             print(f'{row["material"]}: {row["seen"]:g} of {row["expected"]} beads seen (median)')
         film, output = shlex.quote(options.named[0]), shlex.quote(options.output)
-        print(f'next: nanorocks measure {film} --tray {output} -o results')
+        print(f'next: nanorocks measure {film} --trays-file {output} -o results')
     print(f'nanorocks: trays file in {options.output}', file=sys.stderr)

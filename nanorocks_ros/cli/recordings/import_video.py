@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.cli.flags import flag_of, settings_from
+from nanorocks_ros.cli.flags import add_flag, flag_of, settings_from
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, rows
@@ -68,6 +68,7 @@ def add_parser(commands: Any) -> None:
         default=95,
         help='JPEG quality of frames that are not JPEG already, 1 to 100; default 95',
     )
+    parser.leave_out('--quality', '--preprocess-regions-px', '--preprocess-layout')
     parser.set_defaults(run=run)
 
 
@@ -76,13 +77,7 @@ def _add_experiment(group: Any) -> None:
     by_name = {row.name: row for row in rows(PipelineSettings())}
     for name, own_flag in _EXPERIMENT.items():
         row = by_name[name]
-        group.add_argument(
-            *dict.fromkeys((own_flag, flag_of(name))),
-            dest=name,
-            metavar='V',
-            nargs='+' if isinstance(row.default, tuple) else None,
-            help=f'{row.doc}{f" [{row.unit}]" if row.unit else ""}; default: not stated',
-        )
+        add_flag(group, row, 'not stated', tuple(dict.fromkeys((own_flag, flag_of(name)))))
 
 
 def run(options: argparse.Namespace) -> int:

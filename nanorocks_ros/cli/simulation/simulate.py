@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.tray_options import add_trays_file
 from nanorocks_ros.cli.progress import Progress
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings
@@ -33,32 +34,29 @@ The first run is filmed. Results do not depend on the number of workers. Example
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    import argparse
-
     from nanorocks_ros.cli.flags import add_flags
 
     parser = commands.add_parser(
         'simulate',
         help='simulate a tray that cools after a shaking event; write tables and films',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     _add_run_options(parser)
     _add_output_options(parser.add_argument_group('files to write, all optional'))
     add_flags(parser, SimulationSettings(), skip=set())
     add_flags(parser, SceneFilmSettings(), skip=set(), title='settings of --scene')
+    parser.leave_out('--times', '--workers', '--trajectory', '--events', '--effects', '--quality')
+    parser.leave_out('--force', '--json')
     parser.set_defaults(run=run)
 
 
 def _add_run_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--trays-file',
-        help='YAML file of your own trays, numbered 1 to 8; see docs/use/simulate.md',
-    )
+    add_trays_file(parser)
     parser.add_argument('--runs', type=int, default=1, help='number of runs; default 1')
     parser.add_argument(
         '--duration',
         type=float,
+        metavar='S',
         default=_DURATION,
         help='[s] simulated time after the shaking event; films have this length and begin '
         f'--first-shake before it; default {_DURATION:g}',

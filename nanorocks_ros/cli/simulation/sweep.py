@@ -42,15 +42,12 @@ workers. Example:
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    import argparse
-
     from nanorocks_ros.cli.flags import add_flags
 
     parser = commands.add_parser(
         'sweep',
         help='simulate many runs at one point or over a grid of settings',
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('-o', '--output', required=True, help='.npz file to write')
     parser.add_argument('--runs', type=int, default=178, help='runs at each point; default 178')
@@ -85,6 +82,8 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     add_flags(parser, SimulationSettings(), skip=_CAMERA)
+    parser.leave_out('--times', '--scheduler', '--task-seconds', '--common-random-numbers')
+    parser.leave_out('--keep-runs', '--reference', '--free-speed')
     parser.set_defaults(run=run)
 
 

@@ -38,7 +38,7 @@ def curve_key(tray: Tray) -> str:
 
 def build_command(tray: Tray) -> str:
     """Command that makes the curve of a tray."""
-    return f'nanorocks cluster-curve --tray {tray.number} -o curve.npz'
+    return f'nanorocks cluster-curve --trays {tray.number} -o curve.npz'
 
 
 def curve_of(tray: Tray, path: str | Path = '') -> ClusterCurve:

@@ -25,6 +25,8 @@ from nanorocks_ros.inference.flights.flight_losses import (
 )
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import (
+    ONE_SIGMA,
+    UNKNOWN,
     UNKNOWN_MEASURED_INTERVAL,
     FreeFlight,
     Measured,
@@ -59,11 +61,15 @@ class RestitutionOfContacts:
         unknown where the contacts do not determine it.
     speed : float, [m/s]
         Median speed along the normal before the contacts; NaN without any.
+    lower_68, upper_68 : float
+        Ends of the interval with the probability `ONE_SIGMA`.
     """
 
     contacts: int
     restitution: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
     speed: float = float('nan')
+    lower_68: float = float('nan')
+    upper_68: float = float('nan')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +133,7 @@ def contacts_alone(
         beads=_restitution(
             pair_table(collisions, _GRID[::10]),
             collisions,
-            [_approach(pair) for pair in collisions],
+            [pair.normal_speeds[0] for pair in collisions],
             (slowing, prior.collision_bias, probability),
         ),
         walls=walls(rebounds),
@@ -142,12 +148,6 @@ def contacts_alone(
 def _complete(contact: Rebound | PairCollision) -> Rebound | PairCollision:
     """The contact; without friction beside it where no speed is known of that time."""
     return contact if contact.friction_length >= 0.0 else replace(contact, friction_length=0.0)
-
-
-def _approach(pair: PairCollision) -> float:
-    """Speed along the projected line of centres, [m/s]."""
-    normal = pair.separation / np.hypot(*pair.separation)
-    return -float((pair.before[1] - pair.before[0]) @ normal)
 
 
 def _restitution(
@@ -166,12 +166,14 @@ def _restitution(
     loss = loss_beside_contacts(loss_sums(contacts), slowing)
     slowed = likelihood.shifted(best * float(np.expm1(loss.value)))
     posterior = slowed.convolved(float(np.hypot(bias, best * loss.error))).posterior((0.0, 1.0))
-    half = 0.5 * probability
-    lower, upper = posterior.quantiles(np.array([0.5 - half, 0.5 + half])).tolist()
+    halves = 0.5 * np.array([-probability, probability, -ONE_SIGMA, ONE_SIGMA])
+    lower, upper, lower_68, upper_68 = posterior.quantiles(0.5 + halves).tolist()
     known = posterior.deviation <= _LARGEST_DEVIATION
     value = MeasuredInterval(posterior.mean, posterior.deviation, lower, upper)
     return RestitutionOfContacts(
         contacts=len(contacts),
         restitution=value if known else UNKNOWN_MEASURED_INTERVAL,
         speed=float(np.median(speeds)),
+        lower_68=lower_68 if known else UNKNOWN,
+        upper_68=upper_68 if known else UNKNOWN,
     )

@@ -16,9 +16,9 @@ from nanorocks_ros.nodes.base.ros_messages import (
     message_class,
     qos_of,
 )
+from nanorocks_ros.nodes.base.typed_messages import typed_message, typed_problem
 from nanorocks_ros.records import Notice, TrayImage
-from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.products import ARRAY_TOPICS
+from nanorocks_ros.wire.products import ARRAY_TOPICS, TYPED_TOPICS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
 
     from nanorocks_ros.nodes.base.diagnostics import Diagnostics
+    from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.wire.topics import Topic
 
 QOS_OVERRIDES = QoSOverridingOptions(
@@ -43,6 +44,11 @@ QOS_OVERRIDES = QoSOverridingOptions(
 
 # Acknowledgements come with heartbeats, every 3 s.
 _ACKNOWLEDGED_WITHIN_S = 3.5
+
+
+_TYPED_BESIDE = {
+    array.name: TYPED_TOPICS[record_type] for record_type, array in ARRAY_TOPICS.items()
+}
 
 
 class ResultRecorder(Protocol):
@@ -96,9 +102,12 @@ class Outputs:
         return self._by_name[name]
 
     def offer(self, offered: Iterable[Topic], tray: int = 0) -> None:
-        """Make the publishers of some topics."""
+        """Make the publishers of some topics, and of the typed messages beside their arrays."""
         for topic in offered:
             self.publisher(topic, tray)
+            typed = _TYPED_BESIDE.get(topic.name)
+            if typed is not None and not typed_problem():
+                self.publisher(typed, tray)
 
     def is_offered(self, topic: Topic) -> bool:
         """Whether this node publishes a topic."""
@@ -131,13 +140,23 @@ class Outputs:
         if isinstance(record, Notice):
             self._node.get_logger().warning(record.text)
         elif type(record) in ARRAY_TOPICS:
-            message = array_message(record, epoch_ns)
-            self.send(ARRAY_TOPICS[type(record)], message, record.tray)
+            self._publish_array(record, epoch_ns)
         else:
             if isinstance(record, TrayImage):
-                self.send(topics.STATE, array_message(record.state(), epoch_ns), record.tray)
+                self._publish_array(record.state(), epoch_ns)
             self._publish_images(record)
         self._diagnostics.note_result(record)
+
+    def _publish_array(self, record: ArrayRecord, epoch_ns: int) -> None:
+        """Publish a record as an array and, if it is offered and of use, as a typed message."""
+        tray = record.tray
+        if problem := typed_problem():
+            self._node.get_logger().info(problem, once=True)
+        self.send(ARRAY_TOPICS[type(record)], array_message(record, epoch_ns), tray)
+        typed = TYPED_TOPICS[type(record)]
+        publisher = self._by_name.get(typed.of(tray))
+        if publisher and (typed.latched or publisher.get_subscription_count() > 0):
+            publisher.publish(typed_message(record, epoch_ns))
 
     def _publish_images(self, record: Any) -> None:
         """Publish the images of a record that somebody subscribes to."""

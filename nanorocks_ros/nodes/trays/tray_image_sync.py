@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import TrayImage
 
@@ -16,32 +16,23 @@ if TYPE_CHECKING:
 _MAX_KEPT = 60
 # Stamps of one topic increase; a larger step back counts as a loop or a seek.
 _STEP_BACK_NS = 100_000_000
-# Times in arrays are float32: known to 1 ms, and to this share of the time since the epoch.
-_ROUNDING_NS = 1_000_000
-_RELATIVE_ROUNDING = 2.0**-22
-
-
-class _State(NamedTuple):
-    """A state, and how exactly its stamp is known, [ns]."""
-
-    state: TrayState
-    tolerance_ns: float
+# Times in arrays are rounded to some nanoseconds.
+_ROUNDING_NS = 1000
 
 
 class TrayImageSync:
     """Waits for the state and the pixels of each image, in whatever order they arrive."""
 
     def __init__(self) -> None:
-        self._states: deque[_State] = deque(maxlen=_MAX_KEPT)
+        self._states: deque[TrayState] = deque(maxlen=_MAX_KEPT)
         self._grays: deque[Frame] = deque(maxlen=_MAX_KEPT)
         self._colors: deque[Frame] = deque(maxlen=_MAX_KEPT)
         self._last_ns: dict[str, int] = {}
 
-    def add_state(self, state: TrayState, epoch_ns: int) -> list[TrayImage]:
+    def add_state(self, state: TrayState) -> list[TrayImage]:
         """Add a state; the images that are complete now."""
-        tolerance_ns = _ROUNDING_NS + _RELATIVE_ROUNDING * abs(state.stamp_ns - epoch_ns)
         self._forget_before_step_back('state', state.stamp_ns)
-        self._states.append(_State(state, tolerance_ns))
+        self._states.append(state)
         return self._complete()
 
     def add_gray(self, frame: Frame) -> list[TrayImage]:
@@ -64,7 +55,7 @@ class TrayImageSync:
             # the new stamp than to the last one.
             latest_ns = (stamp_ns + last_ns) // 2
             self._states = deque(
-                (entry for entry in self._states if entry.state.stamp_ns <= latest_ns),
+                (state for state in self._states if state.stamp_ns <= latest_ns),
                 maxlen=_MAX_KEPT,
             )
             self._grays = _frames_until(self._grays, latest_ns)
@@ -73,23 +64,22 @@ class TrayImageSync:
     def _complete(self) -> list[TrayImage]:
         images = []
         while self._states:
-            state, tolerance_ns = self._states[0]
-            stamp_ns = state.stamp_ns
-            gray = _nearest(self._grays, stamp_ns, tolerance_ns)
-            color = _nearest(self._colors, stamp_ns, tolerance_ns) if state.color else None
+            state = self._states[0]
+            gray = _at(self._grays, state.stamp_ns)
+            color = _at(self._colors, state.stamp_ns) if state.color else None
             if gray is not None and (color is not None or not state.color):
                 pixels = None if color is None else color.image
                 images.append(TrayImage.of_state(state, gray.stamp_ns, gray.image, pixels))
-            elif not self._is_past(state, tolerance_ns):
+            elif not self._is_past(state):
                 break
             # Without an image here, a part of it was lost in transport.
             self._states.popleft()
         return images
 
-    def _is_past(self, state: TrayState, tolerance_ns: float) -> bool:
+    def _is_past(self, state: TrayState) -> bool:
         """Whether every topic has reached the stamp of a state."""
         topics = (self._grays, self._colors) if state.color else (self._grays,)
-        earliest_ns = state.stamp_ns - tolerance_ns
+        earliest_ns = state.stamp_ns - _ROUNDING_NS
         return all(any(frame.stamp_ns >= earliest_ns for frame in frames) for frames in topics)
 
 
@@ -97,7 +87,7 @@ def _frames_until(frames: Iterable[Frame], latest_ns: int) -> deque[Frame]:
     return deque((frame for frame in frames if frame.stamp_ns <= latest_ns), maxlen=_MAX_KEPT)
 
 
-def _nearest(frames: Iterable[Frame], stamp_ns: int, tolerance_ns: float) -> Frame | None:
+def _at(frames: Iterable[Frame], stamp_ns: int) -> Frame | None:
     return next(
-        (frame for frame in frames if abs(frame.stamp_ns - stamp_ns) <= tolerance_ns), None
+        (frame for frame in frames if abs(frame.stamp_ns - stamp_ns) <= _ROUNDING_NS), None
     )

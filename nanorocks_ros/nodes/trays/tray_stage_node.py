@@ -141,7 +141,7 @@ class TrayStageNode(NanorocksNode):
         )
         if not self._in_color:
             state = replace(state, color=0)
-        self._push_all(state.stamp_ns, self._sync[tray].add_state(state, self._epoch.ns))
+        self._push_all(state.stamp_ns, self._sync[tray].add_state(state))
 
     def _push_all(self, stamp_ns: int, images: Iterable[TrayImage]) -> None:
         for image in images:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _FEWEST_SPEEDS = 4
 # Counts of bodies are kept that long; the instants asked for are some seconds ago.
 _KEPT_NS = 20 * NS
-# Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
+# Stamps that came over the wire may be rounded.
 _ROUNDING_NS = 1_000_000
 
 # Collisions are known two seconds after they happened, as estimates are.

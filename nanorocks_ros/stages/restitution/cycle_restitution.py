@@ -49,6 +49,8 @@ class CycleRestitution:
     restitution_exponent, wall_restitution_exponent : Interval
     impact_speed, wall_impact_speed : float, [m/s]
     impact_restitution, wall_impact_restitution : Interval
+    restitution_lower_68, restitution_upper_68 : float
+    wall_restitution_lower_68, wall_restitution_upper_68 : float
     speed_dependent : bool
         Whether an exponent is not 0, so that neither the decay nor a constant restitution holds.
     """
@@ -84,4 +86,8 @@ class CycleRestitution:
     wall_impact_speed: float = UNKNOWN
     impact_restitution: Interval = UNKNOWN_INTERVAL
     wall_impact_restitution: Interval = UNKNOWN_INTERVAL
+    restitution_lower_68: float = UNKNOWN
+    restitution_upper_68: float = UNKNOWN
+    wall_restitution_lower_68: float = UNKNOWN
+    wall_restitution_upper_68: float = UNKNOWN
     speed_dependent: bool = False

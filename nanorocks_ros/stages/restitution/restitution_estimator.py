@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 # Fields of a `CycleRestitution` that are published under the same name.
 _PUBLISHED = sorted(set(field_names(CycleRestitution)) & set(field_names(CorEstimate)))
-# Stamps that came over the wire are float32 seconds: 0.1 ms half an hour into a recording.
+# Stamps that came over the wire may be rounded.
 _STAMP_ROUNDING_NS = 1_000_000
 # The first speed may come that much later for other reasons than a tray that oscillates.
 _LATE_NS = 500_000_000

@@ -30,6 +30,7 @@ from nanorocks_ros.inference.restitution_sources import (
 from nanorocks_ros.inference.speed_dependence import RunningDependence, speed_dependence
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
+    ONE_SIGMA,
     UNKNOWN_MEASURED,
     CorRelation,
     Headline,
@@ -77,6 +78,12 @@ class Decay:
     of_grains: bool = False
 
 
+def _ends(probability: float) -> NDArray[np.float64]:
+    """Probabilities of lower end, value and upper end of an interval."""
+    return np.array([0.5 - 0.5 * probability, 0.5, 0.5 + 0.5 * probability])
+
+
+_NARROW = _ends(ONE_SIGMA)
 # For the shape of a likelihood that says nothing.
 _ANY_TIMES = np.linspace(1.0, 10.0, 10)
 _ANY_DECAY = Decay(
@@ -147,12 +154,9 @@ class PaperMethod:
         if decay is None:
             return CycleRestitution()
         fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
-        quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * self._probability))
-        spread = math.exp(quantile * fit.log_decay_rate_error)
-        value, lower, upper = (
-            _paper_restitution(rate, self._tray)
-            for rate in (fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread)
-        )
+        quantile, interval = _paper_interval(fit, self._tray, self._probability)
+        _, narrow = _paper_interval(fit, self._tray, ONE_SIGMA)
+        value, lower, upper = interval.value, interval.lower, interval.upper
         if final:
             own = CycleLikelihoods(
                 cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),)
@@ -161,7 +165,9 @@ class PaperMethod:
         return CycleRestitution(
             determined=True,
             headline=Headline.DECAY,
-            restitution=Interval(value, lower, upper),
+            restitution=interval,
+            restitution_lower_68=narrow.lower,
+            restitution_upper_68=narrow.upper,
             paper_restitution=value,
             reduced_chi_square=fit.reduced_chi_square,
             mean_restitution=(
@@ -218,8 +224,7 @@ class DecayLibraryMethod:
         self._drag_prior = Measured(prior.drag, prior.drag_error)
         self._relative_drag = mean_relative_drag(tray)
         check_walls((prior.min_wall_restitution, prior.max_wall_restitution))
-        half = 0.5 * settings.cooling.probability
-        self._ends = np.array([0.5 - half, 0.5, 0.5 + half])
+        self._ends = _ends(settings.cooling.probability)
         self._probability = settings.cooling.probability
         self._include_inconsistent = settings.cooling.include_inconsistent
         self._dependence = RunningDependence()
@@ -413,17 +418,25 @@ def _determined(
 ) -> CycleRestitution:
     """The result with the restitutions that the source of the headline determines."""
     restitution, wall_restitution = sources.intervals(ends)
+    narrow, narrow_walls = sources.intervals(_NARROW)
+    walls = {
+        'wall_restitution': wall_restitution,
+        'wall_restitution_lower_68': narrow_walls.lower,
+        'wall_restitution_upper_68': narrow_walls.upper,
+    }
     if sources.means[0].error <= _LARGEST_DEVIATION:
         return replace(
             result,
             determined=True,
             restitution=restitution,
-            wall_restitution=wall_restitution,
+            restitution_lower_68=narrow.lower,
+            restitution_upper_68=narrow.upper,
             correlation=sources.correlation,
+            **walls,
         )
     if result.rebounds:
         # Rebounds determine the walls even where nothing is known of the beads.
-        return replace(result, wall_restitution=wall_restitution)
+        return replace(result, **walls)
     return result
 
 
@@ -450,6 +463,14 @@ def _by_source(
         'decay_restitution': decay,
         'decay_wall_restitution': decay_walls,
     }
+
+
+def _paper_interval(fit: HaffFit, tray: Tray, probability: float) -> tuple[float, Interval]:
+    """Quantile of Student's t, and the restitution by the closed form with its interval."""
+    quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * probability))
+    spread = math.exp(quantile * fit.log_decay_rate_error)
+    rates = fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread
+    return quantile, Interval(*(_paper_restitution(rate, tray) for rate in rates))
 
 
 def _measured(mean: MeasuredInterval) -> Measured:

@@ -15,7 +15,9 @@ from nanorocks_ros.inference.trend_tests import (
     quiet_periods,
     robust_trend,
 )
-from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.records import CorEstimate
 from nanorocks_ros.studies.analysis.cycle_summaries import (
     CycleSummary,
     SizeMeasure,
@@ -23,6 +25,8 @@ from nanorocks_ros.studies.analysis.cycle_summaries import (
     size_measure,
 )
 from nanorocks_ros.studies.analysis.result_tables import trays_of
+from nanorocks_ros.studies.results.record_columns import columns_of
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -165,30 +169,32 @@ def write_campaign(campaign: Campaign, path: Path) -> None:
     RecordingError
         When it cannot be written.
     """
-    size = campaign.measure.unit
-    units = {
-        'recording': 'name',
-        'place': '1',
-        'tray': '1',
-        'cycle': '1',
-        'start': 's',
-        'peak_speed': 'm/s',
-        'peak_speed_error': 'm/s',
-        'restitution': '1',
-        'restitution_lower': '1',
-        'restitution_upper': '1',
-        'cluster_size': size,
-        'cluster_size_error': size,
-        'quiet': '1',
-    }
+    columns = _campaign_columns(campaign.measure)
     rows = [
         [
-            *(getattr(cycle, name) for name in list(units)[:-1]),
-            int(in_period(campaign, cycle.place)),
+            *(getattr(cycle, column.name) for column in columns[:-1]),
+            in_period(campaign, cycle.place),
         ]
         for cycle in campaign.cycles
     ]
-    write_csv(path, list(units), list(units.values()), rows)
+    write_rows(path, columns, rows, run_provenance())
+
+
+def _campaign_columns(measure: SizeMeasure) -> tuple[Column, ...]:
+    of_cor = {column.name: column for column in columns_of(CorEstimate)}
+    return (
+        Column(name='recording', kind='string', doc='name of the folder of results'),
+        Column(name='place', kind='int64', unit='1', doc='in the campaign, from 0'),
+        Column(name='tray', kind='int64', unit='1', doc='number of the tray'),
+        of_cor['cycle'],
+        Column(name='start', unit='s', doc='of the cycle in the recording, since epoch'),
+        Column(name='peak_speed', unit='m/s', doc='largest mean projected speed of the cycle'),
+        Column(name='peak_speed_error', unit='m/s', doc='one standard error'),
+        *(of_cor[name] for name in ('restitution', 'restitution_lower', 'restitution_upper')),
+        Column(name='cluster_size', unit=measure.unit, doc=f'at the end: {measure.text}'),
+        Column(name='cluster_size_error', unit=measure.unit, doc='one standard error'),
+        Column(name='quiet', kind='bool', doc='whether the cycle is in a quiet period'),
+    )
 
 
 def in_period(campaign: Campaign, place: int) -> bool:

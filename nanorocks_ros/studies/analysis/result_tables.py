@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.limits import require_regular_file
+from nanorocks_ros.outputs.csv_tables import csv_rows
+from nanorocks_ros.studies.results.record_columns import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,24 +43,24 @@ def trays_of(folder: Path, table: str) -> tuple[int, ...]:
 def read_columns(
     path: Path, wanted: Sequence[str], optional: Sequence[str] = ()
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns of a table; those that are optional only where they are there.
+    """Columns of a table as numbers; those that are optional only where they are there.
+
+    Words such as those of `status` become the numbers that stand for them.
 
     Raises
     ------
     RecordingError
         When the table cannot be read, or a column that is wanted is missing.
     """
-    require_regular_file(path, RecordingError)
     try:
-        with path.open(encoding='utf-8', newline='') as stream:
-            lines = (line for line in csv.reader(stream) if line)
-            names = [name.split('[')[0].strip() for name in next(lines, [])]
-            missing = [name for name in wanted if name not in names]
-            if missing:
-                raise RecordingError(str(path), f'has no column {", ".join(missing)}', _FORM)
-            kept = [k for k, name in enumerate(names) if name in {*wanted, *optional}]
-            # Line by line: the text of an hour takes ten times the memory of its numbers.
-            values = [[float(line[k]) for k in kept] for line in lines]
+        lines = csv_rows(path)
+        names = next(lines, [])
+        missing = [name for name in wanted if name not in names]
+        if missing:
+            raise RecordingError(str(path), f'has no column {", ".join(missing)}', _FORM)
+        kept = [k for k, name in enumerate(names) if name in {*wanted, *optional}]
+        # Line by line: the text of an hour takes ten times the memory of its numbers.
+        values = [[number_of(names[k], line[k]) for k in kept] for line in lines]
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'name another folder'

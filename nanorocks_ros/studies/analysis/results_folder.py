@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import json
 import os
 import re
 import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError, UnwritableError
-from nanorocks_ros.experiment.recorded_experiment import experiment_key, metadata_of_settings
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.parquet import Column, write_parquet
-from nanorocks_ros.recordings.bag.bag_folder import read_metadata
+from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
+from nanorocks_ros.outputs.table_files import PACKAGE, write_package, write_table
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import float_array_message, time_message
 from nanorocks_ros.settings import rows
+from nanorocks_ros.studies.results.record_columns import columns_of, record_arrays
+from nanorocks_ros.studies.results.results_provenance import (
+    BAG_NAME,
+    provenance_of,
+    read_provenance,
+)
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout, to_array
 from nanorocks_ros.wire.products import MEASURED
@@ -32,11 +35,12 @@ from nanorocks_ros.wire.products import MEASURED
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
-BAG_NAME = 'results_bag'
 # Beside the tables in a batch.
 SUMMARY, EVIDENCE, STATISTICS = 'bag.json', 'evidence.npz', 'statistics.json'
 
@@ -70,10 +74,8 @@ def check_results_folder(folder: Path) -> Path:
 
 def trays_file_of(folder: Path) -> str:
     """Content of the trays file of some results; empty where the trays flew, or it is unknown."""
-    try:
-        return read_metadata(folder / BAG_NAME).get(experiment_key('trays_file'), '')
-    except RecordingError:
-        return ''
+    provenance = read_provenance(folder)
+    return provenance.trays_file if provenance is not None and provenance.own_trays else ''
 
 
 def write_results(
@@ -115,12 +117,8 @@ def write_results(
             fresh = Path(scratch) / 'fresh'
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
-            provenance = _provenance(source, settings)
-            for number, results in analysis.trays.items():
-                for product in MEASURED:
-                    if records := results.of(product.record):
-                        path = fresh / f'tray_{number}_{product.name}.{form}'
-                        _write_table(path, records, analysis.epoch_ns, provenance)
+            _write_tables(analysis, fresh, source, settings, form)
+            provenance = _bag_provenance(source, settings) | _truth(analysis)
             _write_bag(analysis, fresh / BAG_NAME, provenance)
             if more is not None:
                 more(fresh)
@@ -139,7 +137,7 @@ def _keep_others(folder: Path, fresh: Path) -> None:
     # Files of an earlier analysis, also of a batch, do not belong to the new results.
     table_names = '|'.join(product.name for product in MEASURED)
     tables = rf'tray_\d+_({table_names})\.({"|".join(FORMATS)})'
-    names = map(re.escape, (RESULTS_MARK, BAG_NAME, SUMMARY, EVIDENCE, STATISTICS))
+    names = map(re.escape, (RESULTS_MARK, BAG_NAME, PACKAGE, SUMMARY, EVIDENCE, STATISTICS))
     ours = re.compile('|'.join([tables, r'tray_\d+_statistics\.png', *names]))
     for path in folder.iterdir():
         if ours.fullmatch(path.name) or (fresh / path.name).exists():
@@ -158,32 +156,55 @@ def _linked(source: str | Path, target: str | Path) -> None:
         shutil.copy2(source, target, follow_symlinks=False)
 
 
-def _write_table(
-    path: Path, records: Sequence[ArrayRecord], epoch_ns: int, provenance: dict[str, str]
+def _write_tables(
+    analysis: Analysis, folder: Path, source: Path, settings: PipelineSettings, form: str
 ) -> None:
-    fields = layout(type(records[0])).fields
-    values = (to_array(record, epoch_ns) for record in records)
-    if path.suffix == '.csv':
-        names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
-        write_csv(path, names, units, (row.tolist() for row in values))
-        return
-    columns = [field.name for field in fields]
-    pieces = iter(lambda: [*itertools.islice(values, _PIECE)], [])
-    write_parquet(
-        path,
-        [Column(name=field.name, kind='f8', unit=field.unit) for field in fields],
-        (dict(zip(columns, np.array(piece, dtype=np.float64).T, strict=True)) for piece in pieces),
-        json.dumps(provenance),
-    )
+    """The tables of all trays, and what describes them."""
+    provenance = provenance_of(
+        settings, source=source.name, epoch_ns=analysis.epoch_ns, recorded=analysis.metadata
+    ).as_json()
+    tables = {}
+    for number, results in analysis.trays.items():
+        for product in MEASURED:
+            if records := results.of(product.record):
+                path = folder / f'tray_{number}_{product.name}.{form}'
+                columns = tables[path.name] = columns_of(product.record)
+                pieces = _pieces(product.record, records, analysis.epoch_ns)
+                write_table(path, columns, pieces, provenance, described=False)
+    write_package(folder, tables, provenance)
 
 
-def _provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
+def _pieces(
+    record_type: type[ArrayRecord], records: Sequence[ArrayRecord], epoch_ns: int
+) -> Iterator[dict[str, NDArray[Any]]]:
+    rest = iter(records)
+    while piece := [*itertools.islice(rest, _PIECE)]:
+        yield record_arrays(record_type, piece, epoch_ns)
+
+
+def _bag_provenance(source: Path, settings: PipelineSettings) -> dict[str, str]:
     return {
         'nanorocks_ros': __version__,
         'source': source.name,
         **{row.name: str(row.default) for row in rows(settings)},
         **metadata_of_settings(settings),
     }
+
+
+def truth_keys(tray: int) -> tuple[str, str]:
+    """Keys of the true restitutions of a tray, of beads and of walls, in the results bag."""
+    return f'truth.tray_{tray}.restitution', f'truth.tray_{tray}.wall_restitution'
+
+
+def _truth(analysis: Analysis) -> dict[str, str]:
+    """The true restitutions of simulated trays, which figures show beside those measured."""
+    known: dict[str, str] = {}
+    for number, results in analysis.trays.items():
+        if results.truth:
+            last = results.truth[-1]
+            values = f'{last.restitution:g}', f'{last.wall_restitution:g}'
+            known |= dict(zip(truth_keys(number), values, strict=True))
+    return known
 
 
 def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> None:
@@ -199,7 +220,7 @@ def _write_bag(analysis: Analysis, path: Path, provenance: dict[str, str]) -> No
         bag.write(epoch_topic, analysis.epoch_ns, time_message(analysis.epoch_ns))
         for name, record in heapq.merge(*streams, key=lambda item: item[1].stamp_ns):
             values = to_array(record, analysis.epoch_ns)
-            labels = [field.name for field in layout(type(record)).fields]
+            labels = layout(type(record)).labels
             bag.write(name, record.stamp_ns, float_array_message(labels, values))
 
 

@@ -5,15 +5,14 @@ Tested by ``test/studies/analysis/test_bag_tracks.py``.
 
 from __future__ import annotations
 
-import csv
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros import __version__
-from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.outputs.parquet import Column, write_parquet
+from nanorocks_ros.experiment.trays import tray_values
+from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.table_files import write_table
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,32 +27,33 @@ TABLES = '.csv', '.parquet'
 """Endings of the files below."""
 
 COLUMNS = (
-    Column(name='time', kind='f8', unit='s'),
-    Column(name='frame', kind='i4'),
-    Column(name='tray', kind='i4'),
-    Column(name='id', kind='i4'),
-    Column(name='species', kind='text'),
-    Column(name='x', kind='f8', unit='m'),
-    Column(name='y', kind='f8', unit='m'),
-    Column(name='position_error', kind='f8', unit='m'),
-    Column(name='vx', kind='f8', unit='m/s'),
-    Column(name='vy', kind='f8', unit='m/s'),
-    Column(name='velocity_error', kind='f8', unit='m/s'),
-    Column(name='radius', kind='f8', unit='m'),
-    Column(name='radius_error', kind='f8', unit='m'),
-    Column(name='seen', kind='i4'),
+    Column(name='time', kind='float64', unit='s', doc='since epoch'),
+    Column(name='frame', kind='int32', unit='1', doc='number of the frame, from 0'),
+    Column(name='tray', kind='int32', unit='1', doc='number of the tray'),
+    Column(name='id', kind='int32', unit='1', doc='number of the track'),
+    Column(name='species', kind='string', doc='material of the bead'),
+    Column(name='x', unit='m', doc='of the centre, along columns from the corner of the floor'),
+    Column(name='y', unit='m', doc='along rows'),
+    Column(name='position_error', unit='m', doc='one standard error of each'),
+    Column(name='vx', unit='m/s', doc='past the camera, along columns'),
+    Column(name='vy', unit='m/s', doc='along rows'),
+    Column(name='velocity_error', unit='m/s', doc='one standard error of each'),
+    Column(name='radius', unit='m', doc='of the bead'),
+    Column(name='radius_error', unit='m', doc='one standard error'),
+    Column(name='seen', kind='bool', doc='false where the bead is hidden and predicted'),
 )
-"""Columns of the table, a row for each bead in each frame: positions from the corner of the
-tray floor, velocities past the camera, `seen` 0 where the bead is hidden and predicted."""
+"""Columns of the table, a row for each bead in each frame."""
 
 _LENGTHS = 'x', 'y', 'position_error', 'vx', 'vy', 'velocity_error', 'radius', 'radius_error'
 _PX_COLUMNS = tuple(
-    Column(name=f'{column.name}_px', kind='f8', unit=(column.unit or 'm').replace('m', 'px', 1))
+    Column(
+        name=f'{column.name}_px', kind='float64', unit=(column.unit or 'm').replace('m', 'px', 1)
+    )
     for column in COLUMNS
     if column.name in _LENGTHS
 )
 
-# Digits of a number in CSV: nanometres of a tray, and less than any error.
+# Digits of a number in CSV, except times: nanometres of a tray, and less than any error.
 _DIGITS = 7
 _NS = 1e9
 
@@ -77,8 +77,7 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     Parameters
     ----------
     path : Path
-        ``.csv`` or ``.parquet``; a file there is replaced, once the new one is complete. CSV
-        leaves empty what is not known, and names the units in its first line.
+        ``.csv`` or ``.parquet``; a file there is replaced, once the new one is complete.
     tracked : TrackedBag
 
     Raises
@@ -88,21 +87,14 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     RecordingError
         When the file cannot be written.
     """
-    columns = columns_of(tracked)
-    if path.suffix == '.parquet':
-        write_parquet(path, columns, _pieces(tracked), _provenance(tracked))
-        return
-    with atomic_file(path) as part, part.open('w', encoding='utf-8', newline='') as stream:
-        units = ', '.join(f'{column.name} [{column.unit}]' for column in columns if column.unit)
-        stream.write(f'# {units}\n')
-        writer = csv.writer(stream, lineterminator='\n')
-        writer.writerow([column.name for column in columns])
-        for piece in _pieces(tracked):
-            texts = [_as_text(piece[column.name]) for column in columns]
-            writer.writerows(zip(*texts, strict=True))
+    pieces = track_pieces(tracked)
+    if path.suffix == '.csv':
+        pieces = (_rounded(piece) for piece in pieces)
+    write_table(path, columns_of(tracked), pieces, _provenance(tracked))
 
 
-def _pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+def track_pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+    """The rows of the table, by column, frame by frame."""
     for number in tracked.trays:
         frames = zip(tracked.tracks[number], tracked.numbers[number], strict=True)
         for tracks, frame in frames:
@@ -129,19 +121,25 @@ def _rows(tracks: Tracks, frame: int, tracked: TrackedBag) -> dict[str, NDArray[
         'velocity_error': tracks.velocity_errors,
         'radius': tracks.radii,
         'radius_error': tracks.radius_errors,
-        'seen': tracks.seen.astype(np.int32),
+        'seen': tracks.seen,
     }
     in_px = {f'{name}_px': scale * rows[name] + corner.get(name, 0) for name in _LENGTHS}
     return rows | in_px
 
 
-def _as_text(values: NDArray[Any]) -> list[str]:
-    if values.dtype.kind != 'f':
-        return [str(value) for value in values.tolist()]
-    return ['' if value != value else f'{value:.{_DIGITS}g}' for value in values.tolist()]
+def _rounded(piece: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    return {
+        name: np.array([float(f'{value:.{_DIGITS}g}') for value in values.tolist()])
+        if values.dtype.kind == 'f' and name != 'time'
+        else values
+        for name, values in piece.items()
+    }
 
 
-def _provenance(tracked: TrackedBag) -> str:
-    return json.dumps(
-        {'version': __version__, 'trays': sorted(tracked.trays), 'epoch_ns': tracked.epoch_ns}
-    )
+def _provenance(tracked: TrackedBag) -> dict[str, Any]:
+    return {
+        **run_provenance(),
+        'epoch_ns': tracked.epoch_ns,
+        'pixels_per_metre': tracked.pixels_per_metre,
+        'trays': {number: tray_values(tray) for number, tray in tracked.trays.items()},
+    }

@@ -8,17 +8,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import LineCollection
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles
-
-mpl.use('Agg')
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,17 +60,15 @@ def decays_figure(path: Path, folders: Sequence[Path], trays: Sequence[TrayMeans
         return False
     columns = 1 if len(drawn) == 1 else 2
     rows = math.ceil(len(drawn) / columns)
-    figure = Figure(figsize=(9.5, 1.0 + 2.6 * rows), layout='constrained')
-    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for axes, (means, cycles) in zip(panels, drawn, strict=False):
-        _draw(axes, means, cycles)
-    for axes in panels[len(drawn) :]:
-        axes.set_axis_off()
-    for axes in panels[max(len(drawn) - columns, 0) : len(drawn)]:
-        axes.set_xlabel('time since the shaking event [s]')
-        axes.tick_params(labelbottom=True)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 8.0 + 58.0 * rows) as figure:
+        panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+        for axes, (means, cycles) in zip(panels, drawn, strict=False):
+            _draw(axes, means, cycles)
+        for axes in panels[len(drawn) :]:
+            axes.set_axis_off()
+        for axes in panels[max(len(drawn) - columns, 0) : len(drawn)]:
+            axes.set_xlabel('time since the shaking event [s]')
+            axes.tick_params(labelbottom=True)
     return True
 
 
@@ -92,23 +87,23 @@ def _cycles(folders: Sequence[Path], tray: int) -> list[CycleSpeeds]:
 
 def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:
     lines = [np.column_stack((cycle.times, _MM * cycle.speed)) for cycle in cycles]
-    axes.add_collection(LineCollection(lines, colors='#30506f', linewidths=0.5, alpha=0.35))
+    axes.add_collection(LineCollection(lines, colors=MEASURED, linewidths=0.5, alpha=0.35))
     times, speeds = _median(cycles)
-    axes.plot(times, _MM * speeds, color='#30506f', lw=2.0, label='median')
+    axes.plot(times, _MM * speeds, color=MEASURED, lw=2.0, label='median')
     start, tau = means.means['initial_speed'], means.means['haff_time']
     if start.cycles and tau.cycles:
         law = _MM * start.mean / (1.0 + times / tau.mean)
-        axes.plot(
-            times, law, color='#c23b22', lw=1.2, ls='--', label="Haff's law, mean v0 and tau"
-        )
+        axes.plot(times, law, color=FITTED, lw=1.2, ls='--', label="Haff's law, mean v0 and tau")
     axes.set_xscale('log')
     axes.set_yscale('log')
+    plain_numbers(axes.xaxis)
+    plain_numbers(axes.yaxis)
     axes.autoscale_view()
     axes.set_ylabel('mean speed [mm/s]')
     some = '' if len(cycles) >= means.cycles else f', {len(cycles)} of them drawn'
-    axes.set_title(f'Tray {means.tray}: {counted(means.cycles, "cycle")}{some}', fontsize=10)
+    axes.set_title(f'Tray {means.tray}: {counted(means.cycles, "cycle")}{some}')
     axes.grid(alpha=0.25)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
 
 
 def _median(cycles: Sequence[CycleSpeeds]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

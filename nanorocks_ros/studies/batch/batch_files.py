@@ -5,13 +5,13 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
-from nanorocks_ros import __version__
+from nanorocks_ros.experiment.trays import trays_text
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.batch.batch_report import write_batch_report
 from nanorocks_ros.studies.batch.batch_tables import write_tables
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,10 +48,13 @@ def write_batch(
         When something cannot be written.
     """
     provenance = {
-        'nanorocks_ros': __version__,
-        **{row.name: row.default for row in rows(settings)},
+        **run_provenance(),
+        'settings': {
+            **{row.name: row.default for row in rows(settings)},
+            'trays_file': trays_text(settings.trays_file) if settings.trays_file else '',
+        },
     }
-    write_tables(together, folder, kind, json.dumps(provenance))
+    write_tables(together, folder, kind, provenance)
     path = folder / REPORT
     write_batch_report(path, batch, together, settings)
     return path

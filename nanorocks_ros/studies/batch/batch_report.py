@@ -5,14 +5,23 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.html_report import Picture, Section, Table, number, write_report
+from nanorocks_ros.outputs.html_report import (
+    Picture,
+    Section,
+    Table,
+    made_line,
+    number,
+    with_error,
+    with_interval,
+    write_report,
+)
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.records import AGREEMENT_TENSION
 from nanorocks_ros.settings import PipelineSettings, priors_in_words, rows
@@ -20,6 +29,7 @@ from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 from nanorocks_ros.studies.batch.batch_figure import decays_figure
 from nanorocks_ros.studies.batch.batch_statistics import statistics_section
 from nanorocks_ros.studies.batch.campaign_means import means_as_json
+from nanorocks_ros.studies.batch.mixed_recordings import mixed_recordings
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
 
 if TYPE_CHECKING:
@@ -32,6 +42,11 @@ if TYPE_CHECKING:
 _MM = 1e3
 # Place of a section after restitutions, clusters and figures.
 _AFTER_FIGURES = 3
+_SOURCES = {
+    'joint': ', by decays and contacts together',
+    'contacts': ', by contacts alone',
+    'decay': ', by decays alone',
+}
 _SHORTEST_DAY = 86_400 * 365
 
 
@@ -56,12 +71,13 @@ def write_batch_report(
     seconds = sum(result.summary['seconds'] for result in batch.results)
     cycles = len(together.cycles)
     failed = f'; {len(batch.failed)} failed' if batch.failed else ''
-    summary = (
-        f'nanorocks_ros {__version__}: {counted(len(batch.results), "recording")}, '
+    made = (
+        f'{made_line()} {counted(len(batch.results), "recording")}, '
         f'{counted(frames, "frame")}, {seconds:.0f} s{failed}. '
         f'{counted(cycles, "cooling cycle")} of '
         f'{counted(sum(tray.cycles > 0 for tray in together.trays.values()), "tray")}.'
     )
+    mixed = mixed_recordings(batch.counted)
     try:
         with TemporaryDirectory() as scratch:
             sections = [
@@ -76,11 +92,30 @@ def write_batch_report(
                 sections.insert(_AFTER_FIGURES, gas)
             if batch.failed:
                 sections.insert(0, _failures(batch))
-            write_report(path, 'NanoRocks, all recordings', summary, sections)
+            conclusion = ' '.join([*_conclusions(together), *mixed])
+            write_report(path, 'NanoRocks, all recordings', conclusion, sections, made)
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be written ({error.strerror})', 'make room for its pictures'
         ) from error
+
+
+def _conclusions(together: Combined) -> list[str]:
+    """The restitution of each tray, by all of its cycles, in a sentence each."""
+    if not _known(together):
+        return ['No cycle after a shaking event was found: there is no restitution.']
+    lines = []
+    for tray in _known(together):
+        values = means_as_json(tray)
+        beads, walls = (_interval(values, f'{kind}restitution') for kind in ('', 'wall_'))
+        source = _SOURCES.get(values['headline'] or '', '')
+        lines.append(
+            f'Tray {tray.tray}: restitution of the beads {beads}, of the walls {walls}, from '
+            f'{counted(tray.cycles, "cycle")}{source}.'
+            if beads != '–'
+            else f'Tray {tray.tray}: no restitution from {counted(tray.cycles, "cycle")}.'
+        )
+    return [*lines, 'Brackets are intervals of 95 %.']
 
 
 def _failures(batch: Batch) -> Section:
@@ -161,20 +196,28 @@ def _together(tray: TrayMeans) -> tuple[str, ...]:
     )
 
 
-def _interval(values: dict[str, Any], name: str, digits: int = 4, factor: float = 1.0) -> str:
+def _interval(values: dict[str, Any], name: str, factor: float = 1.0) -> str:
     middle, low, high = (values.get(f'{name}{end}') for end in ('', '_lower', '_upper'))
-    ends = ', '.join(number(end, digits, factor) for end in (low, high))
-    if low is None and high is None:
-        return '–'
-    return f'{number(middle, digits, factor)} [{ends}]'
+    if low is None or high is None:
+        return '–' if low is None and high is None else _one_sided(low, high, factor)
+    if middle is None:
+        return f'{number(low, 3, factor)} to {number(high, 3, factor)}'
+    return with_interval(middle, (low, high), factor)
+
+
+def _one_sided(low: float | None, high: float | None, factor: float) -> str:
+    return (
+        f'above {number(low, 3, factor)}' if high is None else f'below {number(high, 3, factor)}'
+    )
 
 
 def _mean(tray: TrayMeans, name: str, factor: float = 1.0) -> str:
     mean = tray.means[name]
     if not mean.cycles:
         return '–'
-    scatter = f' ± {number(mean.scatter, 2, factor)}' if mean.cycles > 1 else ''
-    return f'{number(mean.mean, 4, factor)}{scatter} ({mean.cycles})'
+    if mean.cycles == 1:
+        return f'{number(mean.mean, 3, factor)} (1)'
+    return f'{with_error(mean.mean, mean.scatter, factor)} ({mean.cycles})'
 
 
 def _clusters(together: Combined) -> Section:
@@ -188,7 +231,7 @@ def _clusters(together: Combined) -> Section:
         rows.append(
             (
                 str(tray.tray),
-                _interval(values, 'sticking_speed', 3, _MM),
+                _interval(values, 'sticking_speed', _MM),
                 status,
                 '–' if merges is None else str(merges),
                 _mean(tray, 'cluster_size', _MM if in_mm else 1.0),
@@ -258,14 +301,21 @@ def _cycle(row: CycleRow, factor: float) -> tuple[str, ...]:
         number(values['start'], 4),
         _interval(values, 'restitution'),
         _interval(values, 'wall_restitution'),
-        number(values['paper_restitution'], 4),
-        number(values['initial_speed'], 3, _MM),
-        number(values['haff_time'], 3),
-        number(values['peak_speed'], 3, _MM),
-        number(values['cluster_size'], 3, factor),
-        _interval(values, 'sticking_speed', 3, _MM),
+        number(values['paper_restitution'], 3),
+        _measured(values, 'initial_speed', _MM),
+        _measured(values, 'haff_time'),
+        _measured(values, 'peak_speed', _MM),
+        _measured(values, 'cluster_size', factor),
+        _interval(values, 'sticking_speed', _MM),
         values['status'].replace('_', ' '),
     )
+
+
+def _measured(values: dict[str, Any], name: str, factor: float = 1.0) -> str:
+    value, error = values[name], values.get(f'{name}_error')
+    if value is None:
+        return '–'
+    return with_error(value, math.nan if error is None else error, factor)
 
 
 def _recordings(batch: Batch, settings: PipelineSettings) -> Section:

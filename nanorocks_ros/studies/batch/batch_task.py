@@ -157,6 +157,10 @@ class BagSummary(TypedDict):
     trays: dict[str, TraySummary]
 
 
+# Of the summary: 2 since flags are words.
+_FORMAT = 2
+
+
 def analyse_bag(task: BagTask) -> BagOutcome:
     """Analyse a recording and write its results, complete or not at all; it never raises."""
     # Other recordings use the other cores.
@@ -217,7 +221,7 @@ def _analysed(task: BagTask) -> BagOutcome:
             str(task.path), 'changed while it was analysed', 'analyse it again when it is complete'
         )
     summary: Any = {
-        'format': 1,
+        'format': _FORMAT,
         'bag': str(task.path),
         'content': content,
         'film': analysis.metadata.get('source_sha256', ''),
@@ -262,7 +266,7 @@ def read_summary(folder: Path) -> BagSummary | None:
         summary = read_object(folder / SUMMARY)
     except (OSError, ValueError, RecordingError):
         return None
-    if summary.get('format') == 1 and set(BagSummary.__annotations__) <= set(summary):
+    if summary.get('format') == _FORMAT and set(BagSummary.__annotations__) <= set(summary):
         return cast('BagSummary', summary)
     return None
 

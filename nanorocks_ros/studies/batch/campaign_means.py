@@ -57,6 +57,7 @@ MEANS = {
 _FITTED = 'initial_speed', 'haff_time'
 # Less known than this nothing is: anything from 0 to 1 has a deviation of 0.29.
 _LEAST_KNOWN = 0.2
+(_WRONG_SCALE,) = Quality.WRONG_SCALE.names()
 
 
 class Mean(NamedTuple):
@@ -187,7 +188,7 @@ def _measure(results: Sequence[BagResults]) -> tuple[str, str]:
         for result in results
         for tray in result.summary['trays'].values()
         if tray['by_cycle'].get(last.column)
-        and not any(cycle['quality'] & Quality.WRONG_SCALE for cycle in tray['cycles'])
+        and not any(_WRONG_SCALE in cycle['quality'] for cycle in tray['cycles'])
     ]
     for measure in SIZE_MEASURES:
         if trays and all(measure.column in tray for tray in trays):

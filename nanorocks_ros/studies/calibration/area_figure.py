@@ -8,13 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import FITTED, GREY, MEASURED, ONE_COLUMN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,8 +22,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.calibration.area_fit import AreaFit
 
 _MM = 1e3
-_MEASURED, _FIT, _IDENTITY = '#30506f', '#c23b22', '#8a8a8a'
-_SIDE, _DPI = 5.0, 110
 
 
 def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
@@ -43,12 +38,14 @@ def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
     RecordingError
         When the picture cannot be written.
     """
-    figure = Figure(figsize=(_SIDE * len(fits), _SIDE), layout='constrained')
-    panels = figure.subplots(1, len(fits), squeeze=False)[0]
-    for axes, (number, fit) in zip(panels, sorted(fits.items()), strict=True):
-        _draw(axes, number, fit)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=_DPI)
+    columns = min(len(fits), 2)
+    rows = -(-len(fits) // columns)
+    with figure_file(path, columns * ONE_COLUMN, rows * ONE_COLUMN) as figure:
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axes, (number, fit) in zip(panels, sorted(fits.items()), strict=False):
+            _draw(axes, number, fit)
+        for axes in panels[len(fits) :]:
+            axes.set_axis_off()
 
 
 def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
@@ -61,7 +58,7 @@ def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
         fmt='o',
         ms=4,
         lw=0.8,
-        color=_MEASURED,
+        color=MEASURED,
         label=f'{fit.windows} windows',
     )
     max_speed = float(area_speed.max()) * 1.1
@@ -70,15 +67,15 @@ def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
     axes.plot(
         line,
         fit.factor * line + _MM * fit.offset,
-        color=_FIT,
+        color=FITTED,
         lw=1.8,
         label=f'{fit.factor:.3g} $\\times$ area{offset}',
     )
-    axes.plot(line, line, color=_IDENTITY, ls='--', lw=1.2, label='no calibration needed')
+    axes.plot(line, line, color=GREY, ls='--', lw=1.2, label='no calibration needed')
     axes.set_xlim(0.0, max_speed)
     axes.set_ylim(0.0, 1.3 * _MM * fit.fastest)
-    axes.set_title(f'tray {number}', loc='left', fontsize=10)
+    axes.set_title(f'tray {number}')
     axes.set_xlabel('speed by the binarised area [mm/s]')
     axes.set_ylabel('mean projected speed by hand [mm/s]')
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
     axes.grid(alpha=0.25)

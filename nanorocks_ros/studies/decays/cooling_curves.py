@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.csv_tables import read_csv
+from nanorocks_ros.outputs.csv_tables import number, read_csv
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, read_curve
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _rows(path: Path, columns: tuple[str, ...]) -> NDArray[np.float64]:
     try:
         names, lines = read_csv(path)
         indices = [names.index(name) for name in columns]
-        values = [[float(line[k]) for k in indices] for line in lines]
+        values = [[number(line[k]) for k in indices] for line in lines]
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'name another file'

@@ -11,6 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.csv_tables import read_csv
 from nanorocks_ros.records import CorStatus
+from nanorocks_ros.studies.results.record_columns import number_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +54,9 @@ def cooling_window(speeds: Path) -> CoolingWindow | None:
         return None
     try:
         names, lines = read_csv(path)
-        rows = np.array([[float(line[names.index(field)]) for field in _FIELDS] for line in lines])
+        rows = np.array(
+            [[number_of(field, line[names.index(field)]) for field in _FIELDS] for line in lines]
+        )
     except (OSError, ValueError, IndexError, csv.Error):
         return None
     if rows.ndim != 2:

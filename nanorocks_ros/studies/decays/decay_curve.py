@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.outputs.csv_tables import read_csv
+from nanorocks_ros.outputs.csv_tables import number, read_csv
 from nanorocks_ros.outputs.npz_archive import read_archive
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def _table(path: Path) -> dict[str, NDArray[np.float64]]:
     try:
         names, lines = read_csv(path)
         wanted = [k for k, name in enumerate(names) if name in (_TIME, _SPEED, _ERROR)]
-        values = [[float(line[k]) for k in wanted] for line in lines]
+        values = [[number(line[k]) for k in wanted] for line in lines]
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be read ({error.strerror})', 'name another file'

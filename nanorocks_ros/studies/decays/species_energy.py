@@ -178,10 +178,10 @@ def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 
     ratio, error = energy_ratio(energies)
     names = ' bead over that of one '.join(energy.species.material for energy in energies)
     spread = f' ± {error:.2f}' if math.isfinite(error) else ''
-    axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}', fontsize=10)
+    axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}')
     axes.set_yscale('log')
     axes.set_ylabel(r'the same of each species, its own $m$ and $\bar{v}$ [nJ]')
-    axes.legend(frameon=False, fontsize=9)
+    axes.legend()
     axes.grid(alpha=0.25)
 
 

@@ -7,14 +7,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import LineCollection
 from scipy import optimize
 
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.inference.decay.confined_decay import confined_restitution
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import (
+    FITTED,
+    LIBRARY,
+    MEASURED,
+    PAPER,
+    TWO_COLUMNS,
+    plain_numbers,
+)
+from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.physics.error_propagation import Estimate
 from nanorocks_ros.physics.haff_law import haff_speed
 from nanorocks_ros.physics.paper_formulas import paper_restitution
@@ -26,10 +35,6 @@ from nanorocks_ros.studies.decays.species_energy import (
     species_energies,
     species_values,
 )
-
-mpl.use('Agg')
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +48,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
 
 _NANOJOULE = 1e9
-_MEASURED, _FIT, _PAPER, _LIBRARY = '#30506f', '#c23b22', '#e8b93c', '#000000'
+_DATA = ('measured', 'mean of the cycles')
 
 
 def decay_figure(
@@ -55,6 +60,7 @@ def decay_figure(
     span: tuple[float, float],
     species: Sequence[Sequence[CycleSpeeds]] = (),
     start: float = 0.0,
+    published: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Draw the energy of the cycles and their mean, with our fit, the library and the paper's fit.
 
@@ -74,6 +80,8 @@ def decay_figure(
     start : float, [s], optional
         Start of the cooling, since the shaking event. Initial speeds refer to this time, or to
         the start of `span` where that is earlier.
+    published : sequence of str, optional
+        Lines about what the analysis published, which stand first.
 
     Returns
     -------
@@ -100,28 +108,38 @@ def decay_figure(
     values: dict[str, Any] = _values(tray, fit, (energy, time), wall_restitution)
     library = _library(tray, cycles, curve, start)
     energies = species_energies(tray, species, span, origin)
-    figure = Figure(figsize=(8.0, 9.0 if energies else 5.5), layout='constrained')
-    panels = figure.subplots(2 if energies else 1, 1, sharex=True, squeeze=False)[:, 0]
-    _draw_energy(panels[0], tray, cycles, curve)
-    _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), values)
-    _draw_library(panels[0], tray, library)
-    panels[0].legend(frameon=False, fontsize=9)
-    for panel in panels[1:]:
-        draw_species(panel, energies, origin)
-    panels[-1].set_xlabel('time since the shaking event [s]')
-    panels[0].set_title(
-        f'Tray {tray.number}, {len(cycles)} cycle{"s" if len(cycles) > 1 else ""}: '
-        f'1/(v0 tau) = {fit.decay_rate:.3g} ± {fit.decay_rate * fit.log_decay_rate_error:.2g} /m',
-        fontsize=10,
-    )
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 190.0 if energies else 120.0) as figure:
+        panels = figure.subplots(2 if energies else 1, 1, sharex=True, squeeze=False)[:, 0]
+        _draw_energy(panels[0], tray, cycles, curve)
+        _draw_laws(panels[0], tray, (curve.times, age), (fit, energy, time), values)
+        _draw_library(panels[0], tray, library)
+        panels[0].legend(*_measured_first(panels[0]))
+        for panel in panels[1:]:
+            draw_species(panel, energies, origin)
+        panels[-1].set_xlabel('time since the shaking event [s]')
+        panels[0].set_title('\n'.join([_headline(tray, len(cycles)), *published]), fontsize=7.5)
     return {
         **values,
         'cooling_start': origin,
         'library': None if library is None else _library_values(library),
         **species_values(energies),
     }
+
+
+def _headline(tray: Tray, cycles: int) -> str:
+    beads = ' and '.join(f'{each.count} of {each.material}' for each in tray.species)
+    length, width, height = (1e3 * side for side in tray.dimensions)
+    return (
+        f'Tray {tray.number}, {counted(cycles, "cycle")}; beads: {beads}; '
+        f'{length:g} x {width:g} x {height:g} mm'
+    )
+
+
+def _measured_first(axes: Axes) -> tuple[list[Any], list[str]]:
+    """Handles and labels of the legend, data before laws."""
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda k: not labels[k].startswith(_DATA))
+    return [handles[k] for k in order], [labels[k] for k in order]
 
 
 def _library(
@@ -157,16 +175,16 @@ def _draw_laws(
     since_shaking, age = times
     scale = relative_energy(1.0, tray.mean_mass) * _NANOJOULE
     law = haff_speed(age, fit.initial_speed, fit.haff_time)
-    label = f"Haff's law, speeds weighted: {_cor_text('confined theory', values, 'confined')}"
-    axes.plot(since_shaking, scale * law**2, color=_FIT, lw=2, zorder=3, label=label)
+    label = f"Haff's law, weighted: {_cor_text('confined theory', values, 'confined')}"
+    axes.plot(since_shaking, scale * law**2, color=FITTED, lw=2, zorder=3, label=label)
     axes.plot(
         since_shaking,
         _NANOJOULE * energy / (1.0 + age / time) ** 2,
-        color=_PAPER,
+        color=PAPER,
         lw=2,
         ls='--',
         zorder=4,
-        label=f'fit of the paper, energies unweighted: {_cor_text("its COR", values, "paper")}',
+        label=f'fit of the paper, unweighted: {_cor_text("its closed form", values, "paper")}',
     )
 
 
@@ -177,11 +195,11 @@ def _draw_library(axes: Axes, tray: Tray, library: LibraryDecay | None) -> None:
     axes.plot(
         library.times,
         scale * library.speed**2,
-        color=_LIBRARY,
+        color=LIBRARY,
         lw=1.6,
         ls=':',
         zorder=5,
-        label=f'simulated decays: COR {_interval(library.restitution)}, '
+        label=f'simulated decays: {_interval(library.restitution)}, '
         f'walls {_interval(library.wall_restitution)}',
     )
 
@@ -253,7 +271,7 @@ def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: S
         axes.add_collection(
             LineCollection(
                 lines,
-                colors=_MEASURED,
+                colors=MEASURED,
                 linewidths=0.7,
                 alpha=max(0.06, min(0.5, 4.0 / len(cycles))),
                 label=f'{len(cycles)} cycles',
@@ -266,11 +284,12 @@ def _draw_energy(axes: Axes, tray: Tray, cycles: Sequence[CycleSpeeds], curve: S
         fmt='o',
         ms=2.5,
         lw=0.8,
-        color=_MEASURED,
+        color=MEASURED,
         zorder=2,
         label='mean of the cycles' if len(cycles) > 1 else 'measured',
     )
     axes.set_yscale('log')
+    plain_numbers(axes.yaxis)
     # On a log scale noise about zero has no lower end.
     axes.set_ylim(bottom=0.3 * scale * float(curve.speed.min()) ** 2)
     axes.set_ylabel(r'energy at the relative speed $\frac{1}{2} m (2\bar{v})^2$ [nJ]')

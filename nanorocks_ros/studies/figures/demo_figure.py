@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TRUTH, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.records import NS, CorRelation, CorStatus
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
+from nanorocks_ros.studies.analysis.published_cycles import Truth, published_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import CorEstimate, GroundTruth, SpeedEstimate
 
 _MM = 1e3
+_COMMAND = 'make demo'
 _NANOJOULE = 1e9
-_MEASURED, _FIT, _TRUTH = '#30506f', '#c23b22', '#8a8a8a'
 
 
 def cooling_figure(
@@ -48,12 +47,13 @@ def cooling_figure(
     ----------
     Upper panel after [B19] fig. 7.
     """
-    figure = Figure(figsize=(8.0, 7.5), layout='constrained')
-    energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2), sharex=True)
-    start_ns = next(speed.cycle_start_ns for speed in speeds if speed.cycle_start_ns is not None)
-    _draw_energy(energy, tray, (speeds, cors, truth), start_ns)
-    _draw_convergence(convergence, cors, truth, start_ns)
-    figure.savefig(path, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 150.0, _COMMAND) as figure:
+        energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2), sharex=True)
+        start_ns = next(
+            speed.cycle_start_ns for speed in speeds if speed.cycle_start_ns is not None
+        )
+        _draw_energy(energy, tray, (speeds, cors, truth), start_ns)
+        _draw_convergence(convergence, cors, truth, start_ns)
 
 
 def _draw_energy(
@@ -72,7 +72,7 @@ def _draw_energy(
         axes.plot(
             [(state.stamp_ns - start_ns) / NS for state in truth],
             energy([state.mean_projected_speed for state in truth]),
-            color=_TRUTH,
+            color=TRUTH,
             lw=3,
             alpha=0.6,
             label='truth (simulator)',
@@ -83,7 +83,7 @@ def _draw_energy(
         energy([speed.mean_projected_speed.value for speed in speeds]),
         'o',
         ms=3.5,
-        color=_MEASURED,
+        color=MEASURED,
         label='from the frames',
     )
     last = cors[-1]
@@ -94,15 +94,18 @@ def _draw_energy(
         axes.plot(
             line,
             energy(list(fitted)),
-            color=_FIT,
+            color=FITTED,
             lw=1.8,
             label=f"Haff's law, $v_0$ = {last.initial_speed.value * _MM:.2f} mm/s, "
             rf'$\tau$ = {last.haff_time.value:.2f} s',
         )
     axes.set_yscale('log')
+    plain_numbers(axes.yaxis)
     axes.set_ylabel(r'energy per bead $\frac{1}{2} m \bar{v}^2$ [nJ]')
-    axes.set_title(f'Tray {tray.number}, cycle {last.cycle}: cooling after the shaking event')
-    axes.legend(frameon=False)
+    title = f'Tray {tray.number}, cycle {last.cycle}: cooling after the shaking event'
+    known = Truth(truth[-1].restitution, truth[-1].wall_restitution) if truth else None
+    axes.set_title('\n'.join([title, *published_lines([last], known)]), fontsize=7.5)
+    axes.legend()
     axes.grid(alpha=0.25)
 
 
@@ -116,23 +119,23 @@ def _draw_convergence(
         time,
         [estimate.restitution.lower for estimate in known],
         [estimate.restitution.upper for estimate in known],
-        color=_FIT,
+        color=FITTED,
         alpha=0.2,
         lw=0,
-        label='interval (statistics only)' if by_paper else 'interval',
+        label='interval (statistics only)' if by_paper else 'interval of 95 %',
     )
     axes.plot(
         time,
         [estimate.restitution.value for estimate in known],
         '-o',
         ms=3,
-        color=_FIT,
+        color=FITTED,
         label=_name(known[-1], by_paper) if known else None,
     )
     if truth:
         axes.axhline(
             truth[-1].restitution,
-            color=_TRUTH,
+            color=TRUTH,
             lw=2,
             ls='--',
             label=f'truth: {truth[-1].restitution:g}',
@@ -145,14 +148,14 @@ def _draw_convergence(
             [estimate.paper_restitution for estimate in known],
             ':',
             lw=1.2,
-            color=_MEASURED,
+            color=MEASURED,
             label='closed form of the paper',
         )
     axes.set_ylim(top=1.005)
-    axes.legend(frameon=False, loc='lower right')
+    axes.legend(loc='lower right')
     axes.grid(alpha=0.25)
 
 
 def _name(last: CorEstimate, by_paper: bool) -> str:
-    source = 'closed form of the paper' if by_paper else 'from simulated decays'
+    source = 'closed form of the paper' if by_paper else 'published'
     return f'{source}: {last.restitution.value:.3f}'

@@ -7,11 +7,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import (
+    BLACK,
+    GREEN,
+    GREY,
+    MEASURED,
+    PAPER,
+    TWO_COLUMNS,
+    plain_numbers,
+)
 from nanorocks_ros.physics.dust_models import (
     ALWAYS_BOUNCING,
     BOUNCING_SLOPE,
@@ -24,9 +32,6 @@ from nanorocks_ros.physics.dust_models import (
     MeasuredThreshold,
 )
 
-mpl.use('Agg')
-from matplotlib.figure import Figure
-
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
@@ -36,7 +41,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
 
 _MM, _MG = 1e3, 1e6
-_PAPER, _MEASURED, _CURVE, _SLOPE, _SEEN = '#e8b93c', '#c23b22', '#7a7a7a', '#30506f', '#4c8c5b'
+_CURVE, _SLOPE, _SEEN = GREY, BLACK, GREEN
 PAPER_SOURCE = 'the paper, twice the mean speed at its onset'
 _MASSES = 1e-10, 1e-3
 # Factor of mass, up and down, over which the slope is drawn.
@@ -106,23 +111,21 @@ def dust_figure(path: Path, points: Sequence[MeasuredThreshold]) -> dict[str, An
     """
     if not points:
         raise ConfigurationError('thresholds', 'there are none', 'give one with --measured')
-    figure = Figure(figsize=(8.5, 6.0), layout='constrained')
-    axes = figure.subplots()
-    _draw_published(axes, points)
-    _draw_points(axes, points)
-    axes.set_xscale('log')
-    axes.set_yscale('log')
-    axes.set_xlim(*(_MG * mass for mass in _MASSES))
-    axes.set_ylim(0.02, 2000.0)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter('{x:g}')
-    axes.set_xlabel('mass of a particle [mg]')
-    axes.set_ylabel('relative speed [mm/s]')
-    axes.set_title('Sticking thresholds and published collision models', fontsize=10)
-    axes.legend(frameon=False, fontsize=8.5, loc='upper right')
-    axes.grid(alpha=0.25)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 130.0) as figure:
+        axes = figure.subplots()
+        _draw_published(axes, points)
+        _draw_points(axes, points)
+        axes.set_xscale('log')
+        axes.set_yscale('log')
+        axes.set_xlim(*(_MG * mass for mass in _MASSES))
+        axes.set_ylim(0.02, 2000.0)
+        for axis in (axes.xaxis, axes.yaxis):
+            plain_numbers(axis)
+        axes.set_xlabel('mass of a particle [mg]')
+        axes.set_ylabel('relative speed [mm/s]')
+        axes.set_title('Sticking thresholds and published collision models')
+        axes.legend(loc='upper right')
+        axes.grid(alpha=0.25)
     return {'points': [_as_dict(point) for point in points], 'curves': _curves_as_dict()}
 
 
@@ -174,7 +177,7 @@ def _draw_published(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
                 (_MG * place, _MM * float(curve.threshold(place))),
                 xytext=(0, 7),
                 textcoords='offset points',
-                fontsize=8,
+                fontsize=7.0,
                 color=_CURVE,
                 va='bottom',
             )
@@ -208,7 +211,7 @@ def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
     labelled: set[str] = set()
     for point in points:
         of_paper = point.source == PAPER_SOURCE
-        colour = _PAPER if of_paper else _MEASURED
+        colour = PAPER if of_paper else MEASURED
         axes.errorbar(
             _MG * point.mass,
             _MM * point.speed,
@@ -236,7 +239,6 @@ def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
             xytext=(-6 if left else 6, 7 if above else -14),
             textcoords='offset points',
             ha='right' if left else 'left',
-            fontsize=8.5,
             bbox={'facecolor': 'white', 'alpha': 0.7, 'lw': 0, 'pad': 0.5},
             zorder=6,
         )

@@ -5,19 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.speed_dependence import speed_dependence
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import (
+    FITTED,
+    GREEN,
+    MEASURED,
+    PAPER,
+    TWO_COLUMNS,
+    plain_numbers,
+)
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.records.headlines import walls_rub
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +39,7 @@ if TYPE_CHECKING:
 _MM = 1e3
 _ENDS, _BARS = np.array([0.025, 0.5, 0.975]), np.array([0.16, 0.5, 0.84])
 _SPEEDS = 60
-_MEASURED, _LAW, _CONSTANT, _PAPER = '#30506f', '#c23b22', '#7a9a3c', '#8a8a8a'
+_LAW, _CONSTANT = FITTED, GREEN
 # Room around the points, over their range, and factor on their outermost speeds.
 _MARGIN, _BEYOND = 0.6, 1.5
 _PAPER_TRAY = 1
@@ -103,17 +107,15 @@ def impact_figure(path: Path, data: ImpactData) -> dict[str, Any]:
             f'{data.terms.collisions} collisions and {data.terms.rebounds} rebounds are too few',
             'give more cycles',
         )
-    figure = Figure(figsize=(9.0, 0.8 + 4.2 * len(drawn)), layout='constrained')
-    for axes, panel in zip(
-        figure.subplots(len(drawn), 1, squeeze=False)[:, 0], drawn, strict=True
-    ):
-        _draw(axes, panel)
-        if panel is panels[0]:
-            _draw_paper(axes, data.tray)
-        axes.legend(frameon=False, fontsize=8.5, loc='lower left', bbox_to_anchor=(0.0, 1.0))
-    figure.suptitle(f'Tray {data.tray}, {counted(data.cycles, "cycle")}', fontsize=11)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 12.0 + 85.0 * len(drawn)) as figure:
+        for axes, panel in zip(
+            figure.subplots(len(drawn), 1, squeeze=False)[:, 0], drawn, strict=True
+        ):
+            _draw(axes, panel)
+            if panel is panels[0]:
+                _draw_paper(axes, data.tray)
+            axes.legend(loc='lower left', bbox_to_anchor=(0.0, 1.0))
+        figure.suptitle(f'Tray {data.tray}, {counted(data.cycles, "cycle")}', x=0.01, ha='left')
     beads, walls = (_values(panel) for panel in panels)
     return {'tray': data.tray, 'cycles': data.cycles, 'beads': beads, 'walls': walls}
 
@@ -160,13 +162,11 @@ def _draw(axes: Axes, panel: _Panel) -> None:
         fmt='o',
         ms=4,
         lw=1.0,
-        color=_MEASURED,
+        color=MEASURED,
         label=f'{panel.title} in ranges of speed, 68 %',
     )
     axes.set_xscale('log')
-    axes.xaxis.set_major_locator(mpl.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter('{x:g}')
-    axes.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
+    plain_numbers(axes.xaxis)
     axes.set_xlim(*ends)
     room = _MARGIN * (upper.max() - lower.min())
     axes.set_ylim(max(lower.min() - room, 0.0), min(upper.max() + room, 1.0))
@@ -197,19 +197,17 @@ def _draw_paper(axes: Axes, tray: int) -> None:
     left, right = axes.get_xlim()
     if tray != _PAPER_TRAY:
         low, high = reported.PAPER_RESTITUTION_RANGE
-        axes.axhspan(low, high, color=_PAPER, alpha=0.1, lw=0)
-        axes.plot(
-            [], [], color=_PAPER, alpha=0.3, lw=6, label=f'paper, all trays: {low} to {high}'
-        )
+        axes.axhspan(low, high, color=PAPER, alpha=0.1, lw=0)
+        axes.plot([], [], color=PAPER, alpha=0.3, lw=6, label=f'paper, all trays: {low} to {high}')
         return
     value, narrow = reported.PAPER_RESTITUTION, _MM * reported.PAPER_NARROW_SPEED
     label = f'paper, figure 13: {value:g} on average at all mean speeds of the gas'
-    axes.plot([left, right], [value, value], ':', color=_PAPER, lw=1.6, label=label)
+    axes.plot([left, right], [value, value], ':', color=PAPER, lw=1.6, label=label)
     if narrow < right:
         axes.plot(
             [max(narrow, left), right],
             [value, value],
-            color=_PAPER,
+            color=PAPER,
             lw=2.2,
             label=f'paper: narrow above {narrow:g} mm/s, up to '
             f'{reported.PAPER_HIGHEST_RESTITUTION:g} below',

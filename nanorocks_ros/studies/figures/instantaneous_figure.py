@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 
 from nanorocks_ros.inference.decay.instantaneous_restitution import instantaneous_cor
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, ORANGE, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.studies.decays.cooling_curves import check_errors, mean_cycle
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,7 +30,7 @@ if TYPE_CHECKING:
 _MM = 1e3
 # Windows of local slopes; half as many with fewer cycles, since their noise is larger.
 _WINDOWS, _MANY_CYCLES = 8, 6
-_MEASURED, _FIT, _BAND = '#30506f', '#c23b22', '#e0a458'
+_BAND = ORANGE
 
 
 def instantaneous_figure(
@@ -43,6 +40,7 @@ def instantaneous_figure(
     *,
     wall_restitution: float,
     span: tuple[float, float],
+    published: Sequence[str] = (),
 ) -> InstantaneousCor:
     """Draw restitution against speed: the paper's estimate, the effect of noise, and ours.
 
@@ -55,6 +53,8 @@ def instantaneous_figure(
         Restitution of the walls, for the local slopes.
     span : tuple of 2 floats, [s]
         First and last time since the shaking event.
+    published : sequence of str, optional
+        Lines about what the analysis published, which stand first.
 
     Raises
     ------
@@ -79,17 +79,12 @@ def instantaneous_figure(
         cycles=len(cycles),
         windows=_WINDOWS if len(cycles) >= _MANY_CYCLES else _WINDOWS // 2,
     )
-    figure = Figure(figsize=(9.0, 8.0), layout='constrained')
-    above, below = figure.subplots(2, 1, sharex=True)
-    _draw_paper(above, cor)
-    _draw_local(below, cor, wall_restitution)
-    above.set_title(
-        f'Tray {tray.number}, '
-        + (f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'),
-        fontsize=10,
-    )
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 150.0) as figure:
+        above, below = figure.subplots(2, 1, sharex=True)
+        _draw_paper(above, cor)
+        _draw_local(below, cor, wall_restitution)
+        kind = f'mean over {len(cycles)} cycles' if len(cycles) > 1 else 'one cycle'
+        above.set_title('\n'.join([f'Tray {tray.number}, {kind}', *published]), fontsize=7.5)
     return cor
 
 
@@ -119,7 +114,7 @@ def _draw_paper(axes: Axes, cor: InstantaneousCor) -> None:
         cor.paper,
         'o',
         ms=3.5,
-        color=_MEASURED,
+        color=MEASURED,
         label="the paper's estimate, from speeds 1 s apart",
     )
     axes.axhline(1.0, color='black', lw=0.7)
@@ -127,7 +122,7 @@ def _draw_paper(axes: Axes, cor: InstantaneousCor) -> None:
     margin = 0.35 * (high - low)
     axes.set_ylim(max(0.0, float(low) - margin), high + margin)
     axes.set_ylabel("COR by the paper's logarithm")
-    axes.legend(frameon=False, fontsize=9)
+    axes.legend()
     axes.grid(alpha=0.25)
 
 
@@ -143,7 +138,7 @@ def _draw_local(axes: Axes, cor: InstantaneousCor, walls: float) -> None:
         fmt='o',
         ms=6,
         capsize=3,
-        color=_FIT,
+        color=FITTED,
         label=f'slope of 1/v through the confined theory, walls {walls:g}',
     )
     if not known.all():
@@ -151,23 +146,20 @@ def _draw_local(axes: Axes, cor: InstantaneousCor, walls: float) -> None:
             RELATIVE_TO_MEAN_SPEED * local.speed[~known] * _MM,
             local.lower[~known],
             local.upper[~known],
-            color=_FIT,
+            color=FITTED,
             alpha=0.4,
             label='no value, only this range',
         )
     if np.isfinite(cor.whole):
         label = f'the same from the whole decay, {cor.whole:.3f}'
-        axes.axhline(cor.whole, color=_FIT, lw=1.2, ls='--', label=label)
+        axes.axhline(cor.whole, color=FITTED, lw=1.2, ls='--', label=label)
     axes.axhline(1.0, color='black', lw=0.7)
     axes.set_ylim(max(0.0, float(local.lower.min()) - 0.05), 1.05)
     axes.set_ylabel('COR by the local slope')
     axes.set_xlabel('collision speed, twice the mean speed by the fit [mm/s]')
     axes.set_xscale('log')
-    axes.xaxis.set_major_formatter('{x:g}')
-    axes.xaxis.set_minor_formatter('{x:g}')
-    # Puts major and minor labels on one line.
-    axes.tick_params(axis='x', which='both', length=4, pad=4)
-    axes.legend(frameon=False, fontsize=9)
+    plain_numbers(axes.xaxis)
+    axes.legend()
     axes.grid(alpha=0.25)
 
 

@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-
-from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.outputs.json_values import finite_or_none, json_values
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import MARKS, SERIES, SKY, TWO_COLUMNS
+from nanorocks_ros.outputs.json_values import finite_or_none, json_values
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,9 +24,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.analysis.long_term import Campaign
 
 _MM = 1e3
-_COLOURS = ('#30506f', '#c23b22', '#e8b93c', '#4c8c5b', '#8a5fa8', '#5f5f5f', '#d07fae', '#2b8f9c')
-_MARKS = 'o', 's', '^', 'D', 'v', 'x', 'P', '*'
-_QUIET = '#9fc5e8'
+_QUIET = SKY
 _MANY_CYCLES = 40
 
 
@@ -50,45 +45,44 @@ def long_term_figure(path: Path, campaign: Campaign) -> None:
     ----------
     [B19] fig. 9 for the cluster sizes.
     """
-    figure = Figure(figsize=(9.5, 8.5), layout='constrained')
-    sizes, peaks, cors = figure.subplots(3, 1, sharex=True)
-    in_mm = campaign.measure.unit == 'm'
-    for axes, quantity, scale, text in (
-        (
-            sizes,
-            'cluster_size',
-            _MM if in_mm else 1.0,
-            f'{campaign.measure.text}{" [mm]" if in_mm else ""}',
-        ),
-        (peaks, 'peak_speed', _MM, 'peak of the mean speed [mm/s]'),
-        (cors, 'restitution', 1.0, 'coefficient of restitution'),
-    ):
-        for k, number in enumerate(campaign.trays):
-            _draw(axes, campaign, number, (quantity, scale, k))
-        for period in campaign.periods:
-            axes.axvspan(period.first + 0.5, period.last + 1.5, color=_QUIET, alpha=0.35, lw=0)
-        axes.set_ylabel(text)
-        axes.grid(alpha=0.25)
-        if not axes.has_data():
-            axes.text(0.5, 0.5, 'not known', transform=axes.transAxes, ha='center', va='center')
-    quiet_periods = len(campaign.periods)
-    sizes.set_title(
-        f'{campaign.places} cycle{"s" * (campaign.places != 1)}; '
-        + (
-            f'{quiet_periods} quiet period{"s" * (quiet_periods > 1)}, shaded'
-            if quiet_periods
-            else 'no quiet period'
-        ),
-        fontsize=10,
-    )
-    sizes.legend(frameon=False, fontsize=8.5, ncols=len(campaign.trays), loc='upper left')
-    low, high = sizes.get_ylim()
-    sizes.set_ylim(low, high + 0.2 * (high - low))
-    cors.set_xlabel('cycle')
-    cors.set_xlim(0.5, campaign.places + 0.5)
-    cors.xaxis.set_major_locator(MaxNLocator(integer=True))
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 160.0) as figure:
+        sizes, peaks, cors = figure.subplots(3, 1, sharex=True)
+        in_mm = campaign.measure.unit == 'm'
+        for axes, quantity, scale, text in (
+            (
+                sizes,
+                'cluster_size',
+                _MM if in_mm else 1.0,
+                f'{campaign.measure.text}{" [mm]" if in_mm else ""}',
+            ),
+            (peaks, 'peak_speed', _MM, 'peak of the mean speed [mm/s]'),
+            (cors, 'restitution', 1.0, 'coefficient of restitution'),
+        ):
+            for k, number in enumerate(campaign.trays):
+                _draw(axes, campaign, number, (quantity, scale, k))
+            for period in campaign.periods:
+                axes.axvspan(period.first + 0.5, period.last + 1.5, color=_QUIET, alpha=0.2, lw=0)
+            axes.set_ylabel(text)
+            axes.grid(alpha=0.25)
+            if not axes.has_data():
+                axes.text(
+                    0.5, 0.5, 'not known', transform=axes.transAxes, ha='center', va='center'
+                )
+        quiet_periods = len(campaign.periods)
+        sizes.set_title(
+            f'{campaign.places} cycle{"s" * (campaign.places != 1)}; '
+            + (
+                f'{quiet_periods} quiet period{"s" * (quiet_periods > 1)}, shaded'
+                if quiet_periods
+                else 'no quiet period'
+            ),
+        )
+        sizes.legend(ncols=len(campaign.trays), loc='upper left')
+        low, high = sizes.get_ylim()
+        sizes.set_ylim(low, high + 0.2 * (high - low))
+        cors.set_xlabel('cycle')
+        cors.set_xlim(0.5, campaign.places + 0.5)
+        cors.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _draw(axes: Axes, campaign: Campaign, tray: int, column: tuple[str, float, int]) -> None:
@@ -101,12 +95,12 @@ def _draw(axes: Axes, campaign: Campaign, tray: int, column: tuple[str, float, i
     x = np.arange(campaign.places, dtype=np.float64)
     # Trays side by side.
     offset = 0.12 * (k - 0.5 * (len(campaign.trays) - 1))
-    colour = _COLOURS[k % len(_COLOURS)]
+    colour = SERIES[k % len(SERIES)]
     axes.errorbar(
         x[known] + 1.0 + offset,
         values[known],
         yerr=scale * _errors(campaign, tray, quantity)[:, known],
-        fmt=_MARKS[k % len(_MARKS)],
+        fmt=MARKS[k % len(MARKS)],
         ms=4 if campaign.places <= _MANY_CYCLES else 2.5,
         lw=0.7,
         color=colour,

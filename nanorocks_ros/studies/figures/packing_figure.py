@@ -8,19 +8,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import FITTED, GREY, MEASURED, PAPER, SERIES, TWO_COLUMNS
 from nanorocks_ros.physics.filling_factor import (
     HEXAGONAL_LAYER,
     PAPER_COMPACTION,
     RANDOM_CLOSE_PACKING,
 )
 from nanorocks_ros.studies.analysis.cluster_packing import compaction, paper_filling_of_level_area
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,7 +29,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.studies.analysis.cluster_packing import Compaction, PackingCurve
 
-_COLOURS = ('#30506f', '#c23b22', '#e8b93c', '#4c8c5b', '#8a5fa8', '#5f5f5f', '#d07fae', '#2b8f9c')
 _BINS = 30
 # Time since the shaking event in which beads are single, [s].
 _SINGLE_TIME = 1.5
@@ -65,20 +61,18 @@ def packing_figure(
         number: [compaction(curve) for curve in tray_curves]
         for number, tray_curves in curves.items()
     }
-    figure = Figure(figsize=(11.0, 4.8), layout='constrained')
-    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-    known = any(
-        np.isfinite(curve.filling).any()
-        for tray_curves in curves.values()
-        for curve in tray_curves
-    )
-    (_draw_fillings if known else _draw_areas)(left, curves)
-    _draw_compaction(right, compactions)
-    left.set_xlabel('time since the shaking event [s]')
-    for axes in (left, right):
-        axes.grid(alpha=0.25)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 85.0) as figure:
+        left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+        known = any(
+            np.isfinite(curve.filling).any()
+            for tray_curves in curves.values()
+            for curve in tray_curves
+        )
+        (_draw_fillings if known else _draw_areas)(left, curves)
+        _draw_compaction(right, compactions)
+        left.set_xlabel('time since the shaking event [s]')
+        for axes in (left, right):
+            axes.grid(alpha=0.25)
     return {
         str(number): _values(trays[number], tray_curves, compactions[number])
         for number, tray_curves in curves.items()
@@ -141,7 +135,7 @@ def _binned(
 
 
 def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
-    for colour, (number, tray_curves) in zip(_COLOURS, curves.items(), strict=False):
+    for colour, (number, tray_curves) in zip(SERIES, curves.items(), strict=False):
         for style, kind, text in (
             ('-', 'filling', 'layer one bead high'),
             (':', 'in_space', 'true height'),
@@ -155,36 +149,36 @@ def _draw_fillings(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> 
         f'hexagonal layer of equal beads, {HEXAGONAL_LAYER:.3f}',
         ha='right',
         va='top',
-        fontsize=8.5,
+        fontsize=7.0,
         transform=axes.get_yaxis_transform(),
     )
-    axes.axhline(RANDOM_CLOSE_PACKING, color='#8a8a8a', lw=1.0, ls='--')
+    axes.axhline(RANDOM_CLOSE_PACKING, color=GREY, lw=1.0, ls='--')
     axes.text(
         0.99,
         RANDOM_CLOSE_PACKING + 0.005,
         f'random close packing in space, {RANDOM_CLOSE_PACKING:g}',
         ha='right',
         va='bottom',
-        fontsize=8.5,
-        color='#5f5f5f',
+        fontsize=7.0,
+        color=GREY,
         transform=axes.get_yaxis_transform(),
     )
     axes.set_ylim(0.0, 0.95)
     axes.set_ylabel('filling factor of the hulls of clusters')
-    axes.set_title('True positions: mean over cycles', fontsize=10)
-    axes.legend(frameon=False, fontsize=8.5, ncols=2, loc='upper right')
+    axes.set_title('True positions: mean over cycles')
+    axes.legend(ncols=2, loc='upper right')
 
 
 def _draw_areas(axes: Axes, curves: Mapping[int, Sequence[PackingCurve]]) -> None:
-    for colour, (number, tray_curves) in zip(_COLOURS, curves.items(), strict=False):
+    for colour, (number, tray_curves) in zip(SERIES, curves.items(), strict=False):
         ends = [compaction(curve).end for curve in tray_curves]
         relative = [end / curve.level_area for curve, end in zip(tray_curves, ends, strict=True)]
         times, mean = _binned(tray_curves, relative)
         axes.plot(times, mean, '-', color=colour, lw=1.8, label=f'tray {number}')
     axes.axhline(1.0, color='black', lw=0.7)
     axes.set_ylabel('end of the cycle over level area')
-    axes.set_title("The paper's filling factor, over that at the end", fontsize=10)
-    axes.legend(frameon=False)
+    axes.set_title("The paper's filling factor, over that at the end")
+    axes.legend()
 
 
 def _draw_compaction(axes: Axes, compactions: Mapping[int, Sequence[Compaction]]) -> None:
@@ -195,10 +189,10 @@ def _draw_compaction(axes: Axes, compactions: Mapping[int, Sequence[Compaction]]
                 -0.2,
                 "the paper's rule, these images",
                 'o',
-                '#30506f',
+                MEASURED,
                 [cycle.apparent for cycle in cycles],
             ),
-            (0.2, 'true', 's', '#c23b22', [cycle.true for cycle in cycles]),
+            (0.2, 'true', 's', FITTED, [cycle.true for cycle in cycles]),
         ]
         for offset, text, mark, colour, values in series:
             mean, error = _mean(values)
@@ -223,7 +217,7 @@ def _draw_compaction(axes: Axes, compactions: Mapping[int, Sequence[Compaction]]
                 100.0 * printed,
                 'D',
                 ms=6,
-                color='#e8b93c',
+                color=PAPER,
                 mec='black',
                 mew=0.5,
                 label=None if text in labelled else text,
@@ -235,5 +229,5 @@ def _draw_compaction(axes: Axes, compactions: Mapping[int, Sequence[Compaction]]
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.4 * (high - low))
     axes.set_ylabel('compaction [%]')
-    axes.set_title('From the widest autocorrelation to the end', fontsize=10)
-    axes.legend(frameon=False, fontsize=8.5)
+    axes.set_title('Widest autocorrelation to the end')
+    axes.legend()

@@ -9,19 +9,16 @@ import json
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.patheffects import withStroke
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import MAP, TWO_COLUMNS
 from nanorocks_ros.settings import SimulationSettings, rows
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
 from nanorocks_ros.studies.decays.sweep_contours import contours
-
-mpl.use('Agg')
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,22 +94,20 @@ def chi_square_figure(
     values = chi_square(sweep, curve, scaled=scaled)
     across, up = (np.array(axis.values, dtype=np.float64) for axis in sweep.axes)
     order = np.ix_(np.argsort(across), np.argsort(up))
-    figure = Figure(figsize=(7.5, 6.0), layout='constrained')
-    axes = figure.subplots()
-    shown = np.maximum(values[order].T, _AGREEMENT)
-    mesh = axes.pcolormesh(
-        np.sort(across),
-        np.sort(up),
-        shown,
-        shading='nearest',
-        cmap='turbo',
-        norm=LogNorm(vmin=_AGREEMENT, vmax=max(float(shown.max()), 2.0)),
-    )
-    figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
-    _draw_contours(axes, sweep, curve)
-    _mark(axes, sweep, values, curve)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 140.0) as figure:
+        axes = figure.subplots()
+        shown = np.maximum(values[order].T, _AGREEMENT)
+        mesh = axes.pcolormesh(
+            np.sort(across),
+            np.sort(up),
+            shown,
+            shading='nearest',
+            cmap=MAP,
+            norm=LogNorm(vmin=_AGREEMENT, vmax=max(float(shown.max()), 2.0)),
+        )
+        figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
+        _draw_contours(axes, sweep, curve)
+        _mark(axes, sweep, values, curve)
 
 
 def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCurve) -> None:
@@ -138,7 +133,7 @@ def _mark(axes: Axes, sweep: Sweep, values: NDArray[np.float64], curve: SpeedCur
     axes.set_title(f'{_fixed_settings(sweep)}{sweep.runs} runs at each of {values.size} points')
     # Beside the map, since the minimum may lie in a corner.
     figure: Any = axes.figure
-    figure.legend(loc='outside lower center', ncols=3, fontsize=9, facecolor='#c8ccd4')
+    figure.legend(loc='outside lower center', ncols=3, facecolor='#c8ccd4', frameon=True)
 
 
 def _fixed_settings(sweep: Sweep) -> str:

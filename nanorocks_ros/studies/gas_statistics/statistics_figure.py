@@ -9,15 +9,11 @@ import math
 from itertools import cycle
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
-import matplotlib.ticker
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import GREY, SERIES, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.studies.gas_statistics.velocity_distribution import EDGES, sonine_density
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,9 +25,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.gas_statistics.tray_statistics import TrayStatistics
 
 _MM, _NANOJOULE = 1e3, 1e9
-_SIZE, _DPI = (13.0, 8.0), 110
-_COLOURS = ('#2166ac', '#c23b22', '#1b7837', '#762a83', '#b8860b', '#008080')
-_REFERENCE = '#8a8a8a'
+_HEIGHT = 195.0
 _LEAST_DENSITY, _HIGHEST_DENSITY = 1e-3, 10.0
 # Largest cumulant at which the first Sonine polynomial alone is drawn: beyond, it goes negative.
 _MOST_SONINE = 0.5
@@ -53,25 +47,22 @@ def statistics_figure(path: Path, statistics: TrayStatistics) -> None:
     RecordingError
         When the file cannot be written.
     """
-    figure = Figure(figsize=_SIZE, layout='constrained')
-    panels = figure.subplots(2, 3)
-    figure.suptitle(
-        f'tray {statistics.tray.number}: {len(statistics.cycles)} '
-        f'{"cycle" if len(statistics.cycles) == 1 else "cycles"}, {statistics.seconds:.0f} s',
-        fontsize=11,
-    )
-    drawings = (_energies, _velocities, _collisions, _pairs, _structure, _clustering)
-    for axes, draw in zip(panels.flat, drawings, strict=True):
-        draw(axes, statistics)
-        axes.grid(alpha=0.25)
-        if axes.get_yscale() == 'log' and draw is not _velocities:
-            # Labels between powers of ten only where few of them are shown.
-            axes.yaxis.set_minor_formatter(mpl.ticker.LogFormatter())
-            axes.yaxis.set_major_formatter('{x:g}')
-        if axes.get_legend_handles_labels()[0]:
-            axes.legend(frameon=False, fontsize=8)
-    with atomic_file(path) as file:
-        figure.savefig(file, dpi=_DPI)
+    with figure_file(path, TWO_COLUMNS, _HEIGHT) as figure:
+        panels = figure.subplots(3, 2)
+        figure.suptitle(
+            f'tray {statistics.tray.number}: {len(statistics.cycles)} '
+            f'{"cycle" if len(statistics.cycles) == 1 else "cycles"}, {statistics.seconds:.0f} s',
+            x=0.01,
+            ha='left',
+        )
+        drawings = (_energies, _velocities, _collisions, _pairs, _structure, _clustering)
+        for axes, draw in zip(panels.flat, drawings, strict=True):
+            draw(axes, statistics)
+            axes.grid(alpha=0.25)
+            if axes.get_yscale() == 'log' and draw is not _velocities:
+                plain_numbers(axes.yaxis)
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend()
 
 
 def _text(measured: Measured, digits: int = 2) -> str:
@@ -91,7 +82,7 @@ def _energies(axes: Axes, statistics: TrayStatistics) -> None:
             fmt='o',
             ms=3.5,
             lw=0.8,
-            color=_COLOURS[kind % len(_COLOURS)],
+            color=SERIES[kind % len(SERIES)],
             label=name + ratio,
         )
     axes.set_yscale('log')
@@ -101,7 +92,7 @@ def _energies(axes: Axes, statistics: TrayStatistics) -> None:
 
 def _velocities(axes: Axes, statistics: TrayStatistics) -> None:
     middles, fine = 0.5 * (EDGES[:-1] + EDGES[1:]), np.linspace(EDGES[0], EDGES[-1], 301)
-    axes.plot(fine, sonine_density(fine, 0.0), color=_REFERENCE, lw=3, alpha=0.6, label='Maxwell')
+    axes.plot(fine, sonine_density(fine, 0.0), color=GREY, lw=3, alpha=0.6, label='Maxwell')
     for kind, shape in enumerate(statistics.velocities):
         if shape is None:
             continue
@@ -113,13 +104,13 @@ def _velocities(axes: Axes, statistics: TrayStatistics) -> None:
             fmt='o',
             ms=3.0,
             lw=0.8,
-            color=_COLOURS[kind % len(_COLOURS)],
+            color=SERIES[kind % len(SERIES)],
             label=f'{name}: a2 {_text(shape.fourth_cumulant)}, '
             f'anisotropy {_text(shape.anisotropy)}',
         )
         if abs(shape.fourth_cumulant.value) <= _MOST_SONINE:
             density = sonine_density(fine, shape.fourth_cumulant.value)
-            colour = _COLOURS[kind % len(_COLOURS)]
+            colour = SERIES[kind % len(SERIES)]
             axes.plot(fine, np.where(density > 0.0, density, np.nan), color=colour, lw=1)
     axes.set_yscale('log')
     axes.set_ylim(_LEAST_DENSITY, _HIGHEST_DENSITY)
@@ -140,7 +131,7 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
             fmt='o',
             ms=3.5,
             lw=0.8,
-            color=_COLOURS[kind % len(_COLOURS)],
+            color=SERIES[kind % len(SERIES)],
             label=f'{name}: mean free path {_MM * rate.mean_free_path.value:.2f} ± '
             f'{_MM * rate.mean_free_path.error:.2f} mm',
         )
@@ -148,7 +139,7 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
         axes.plot(
             part.time[order],
             rate.theory_per_path * part.mean_projected_speed[order],
-            color=_COLOURS[kind % len(_COLOURS)],
+            color=SERIES[kind % len(SERIES)],
             lw=1,
             label=f'theory: {_MM * rate.theory_mean_free_path:.2f} mm',
         )
@@ -165,7 +156,7 @@ def _draw_wall_hits(
     walls, part = statistics.wall_hits[kind], statistics.temperatures[kind]
     if walls is None:
         return
-    colour = _COLOURS[kind % len(_COLOURS)]
+    colour = SERIES[kind % len(SERIES)]
     axes.errorbar(
         part.time,
         walls.per_path.value * part.mean_projected_speed,
@@ -189,9 +180,9 @@ def _draw_wall_hits(
 
 
 def _pairs(axes: Axes, statistics: TrayStatistics) -> None:
-    axes.axhline(1.0, color=_REFERENCE, lw=1)
+    axes.axhline(1.0, color=GREY, lw=1)
     highest = 0.0
-    for pair, colour in zip(statistics.pairs, cycle(_COLOURS), strict=False):
+    for pair, colour in zip(statistics.pairs, cycle(SERIES), strict=False):
         names = ' and '.join(statistics.tray.species[kind].material for kind in pair.species)
         distance = _MM * pair.distance
         axes.fill_between(
@@ -207,7 +198,7 @@ def _pairs(axes: Axes, statistics: TrayStatistics) -> None:
 
 def _structure(axes: Axes, statistics: TrayStatistics) -> None:
     factor = statistics.structure
-    axes.axhline(1.0, color=_REFERENCE, lw=1)
+    axes.axhline(1.0, color=GREY, lw=1)
     axes.errorbar(
         factor.wave_number / _MM,
         factor.value,
@@ -215,10 +206,10 @@ def _structure(axes: Axes, statistics: TrayStatistics) -> None:
         fmt='o',
         ms=3.5,
         lw=0.8,
-        color=_COLOURS[0],
+        color=SERIES[0],
         label='all beads',
     )
-    axes.plot(factor.wave_number / _MM, factor.random, ':', color=_COLOURS[0], label='random')
+    axes.plot(factor.wave_number / _MM, factor.random, ':', color=SERIES[0], label='random')
     axes.set_ylim(0.0, None)
     axes.set_xlabel('wave number k [1/mm]')
     axes.set_ylabel('S(k)')
@@ -229,18 +220,18 @@ def _clustering(axes: Axes, statistics: TrayStatistics) -> None:
     axes.axhspan(
         reference.random - reference.random_deviation,
         reference.random + reference.random_deviation,
-        color=_REFERENCE,
+        color=GREY,
         alpha=0.25,
         lw=0,
         label='random places',
     )
     onsets = [part.onset for part in statistics.clustering if math.isfinite(part.onset)]
     for part in statistics.clustering:
-        axes.plot(part.time, part.value, 'o-', ms=3.0, lw=0.8, color=_COLOURS[0], alpha=0.7)
+        axes.plot(part.time, part.value, 'o-', ms=3.0, lw=0.8, color=SERIES[0], alpha=0.7)
     for onset in onsets:
-        axes.axvline(onset, color=_COLOURS[1], lw=1)
+        axes.axvline(onset, color=SERIES[1], lw=1)
     title = f'clustering from {min(onsets):.1f} s on' if onsets else 'no clustering'
-    axes.set_title(title, fontsize=10)
+    axes.set_title(title)
     axes.set_ylim(0.0, None)
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('S of the long waves')

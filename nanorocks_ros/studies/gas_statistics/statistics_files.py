@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.json_values import json_values
+from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.table_files import write_package
 from nanorocks_ros.records import Measured
 from nanorocks_ros.studies.gas_statistics.velocity_distribution import EDGES, sonine_density
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -18,56 +21,60 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.studies.gas_statistics.tray_statistics import TrayStatistics
 
+_TRAY = Column(name='tray', kind='int64', unit='1', doc='number of the tray')
+_SPECIES = Column(name='species', kind='string', doc='material of the beads')
+_CYCLE = Column(name='cycle', kind='int64', unit='1', doc='shaking events so far')
+_RANDOM = Column(name='random', unit='1', doc='the same of beads placed at random')
 TABLES = {
     'energies.csv': (
-        ('tray', '1'),
-        ('species', '1'),
-        ('cycle', '1'),
-        ('time', 's'),
-        ('duration', 's'),
-        ('mean_projected_speed', 'm/s'),
-        ('temperature_x', 'm^2/s^2'),
-        ('temperature_y', 'm^2/s^2'),
-        ('temperature_error', 'm^2/s^2'),
-        ('energy', 'J'),
-        ('energy_error', 'J'),
-        ('share', '1'),
+        _TRAY,
+        _SPECIES,
+        _CYCLE,
+        Column(name='time', unit='s', doc='mean time since the shaking event'),
+        Column(name='duration', unit='s', doc='length of the part of the cycle'),
+        Column(name='mean_projected_speed', unit='m/s', doc='in the image plane'),
+        Column(name='temperature_x', unit='m^2/s^2', doc='mean square of a component, columns'),
+        Column(name='temperature_y', unit='m^2/s^2', doc='along rows'),
+        Column(name='temperature_error', unit='m^2/s^2', doc='one standard error of each'),
+        Column(name='energy', unit='J', doc='mean kinetic energy of a bead'),
+        Column(name='energy_error', unit='J', doc='one standard error'),
+        Column(name='share', unit='1', doc='of the beads, those that are seen'),
     ),
     'velocities.csv': (
-        ('tray', '1'),
-        ('species', '1'),
-        ('scaled_velocity', '1'),
-        ('density', '1'),
-        ('density_error', '1'),
-        ('maxwell', '1'),
-        ('sonine', '1'),
+        _TRAY,
+        _SPECIES,
+        Column(name='scaled_velocity', unit='1', doc='a component over its root mean square'),
+        Column(name='density', unit='1', doc='probability density'),
+        Column(name='density_error', unit='1', doc='one standard error'),
+        Column(name='maxwell', unit='1', doc='density of Maxwell'),
+        Column(name='sonine', unit='1', doc='density with the measured fourth cumulant'),
     ),
     'pairs.csv': (
-        ('tray', '1'),
-        ('species', '1'),
-        ('other', '1'),
-        ('distance', 'm'),
-        ('pair_correlation', '1'),
-        ('pair_correlation_error', '1'),
-        ('random', '1'),
+        _TRAY,
+        _SPECIES,
+        Column(name='other', kind='string', doc='material of the other beads'),
+        Column(name='distance', unit='m', doc='of two centres, in the image plane'),
+        Column(name='pair_correlation', unit='1', doc='density of pairs over that at random'),
+        Column(name='pair_correlation_error', unit='1', doc='one standard error'),
+        _RANDOM,
     ),
     'structure.csv': (
-        ('tray', '1'),
-        ('wave_number', '1/m'),
-        ('structure_factor', '1'),
-        ('structure_factor_error', '1'),
-        ('random', '1'),
+        _TRAY,
+        Column(name='wave_number', unit='1/m', doc='of the waves'),
+        Column(name='structure_factor', unit='1', doc='1 for beads placed independently'),
+        Column(name='structure_factor_error', unit='1', doc='one standard error'),
+        _RANDOM,
     ),
     'clustering.csv': (
-        ('tray', '1'),
-        ('cycle', '1'),
-        ('time', 's'),
-        ('structure_factor', '1'),
-        ('random', '1'),
-        ('random_deviation', '1'),
+        _TRAY,
+        _CYCLE,
+        Column(name='time', unit='s', doc='since the shaking event'),
+        Column(name='structure_factor', unit='1', doc='of the longest waves'),
+        _RANDOM,
+        Column(name='random_deviation', unit='1', doc='standard deviation at random'),
     ),
 }
-"""Tables by name of file: fields and units."""
+"""Columns of the tables by name of file."""
 
 
 def write_tables(folder: Path, statistics: Mapping[int, TrayStatistics]) -> None:
@@ -93,9 +100,9 @@ def write_tables(folder: Path, statistics: Mapping[int, TrayStatistics]) -> None
         'clustering.csv': _clustering,
     }
     for name, columns in TABLES.items():
-        fields, units = zip(*columns, strict=True)
         lines = (row for tray in statistics.values() for row in rows[name](tray))
-        write_csv(folder / name, fields, units, lines)
+        write_csv(folder / name, columns, lines)
+    write_package(folder, TABLES, run_provenance())
 
 
 def statistics_values(statistics: TrayStatistics) -> dict[str, Any]:

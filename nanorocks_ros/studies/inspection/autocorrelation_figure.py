@@ -8,13 +8,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import (
+    MAP,
+    MEASURED,
+    TRUTH,
+    TWO_COLUMNS,
+    VERMILION,
+    plain_numbers,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,10 +32,9 @@ if TYPE_CHECKING:
         Snapshot,
     )
 
-_OURS, _PAPER, _TRUTH = '#2166ac', '#c23b22', '#8a8a8a'
 _LEVELS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 _MM = 1e3
-_WIDTH, _HEIGHT, _DPI = 12.0, 4.2, 100
+_HEIGHT = 88.0
 
 
 def autocorrelation_figure(path: Path, clusters: BagClusters, pixels_per_metre: float) -> None:
@@ -53,37 +56,35 @@ def autocorrelation_figure(path: Path, clusters: BagClusters, pixels_per_metre: 
     ----------
     After [B19] fig. 8.
     """
-    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(clusters.trays)), layout='constrained')
-    parts = figure.subfigures(len(clusters.trays), 1, squeeze=False)[:, 0]
-    for part, (number, tray) in zip(parts, clusters.trays.items(), strict=True):
-        left, right = part.subfigures(1, 2, width_ratios=(5, 6))
-        pairs = left.subplots(2, 2, squeeze=False)
-        ends = tray.snapshots[0], tray.snapshots[-1]
-        for row, snapshot in zip(pairs, ends, strict=True):
-            _draw_snapshot(row, snapshot, pixels_per_metre)
-        _draw_sizes(right.subplots(), tray)
-        part.suptitle(f'tray {number}, cycle {clusters.cycle}', x=0.01, ha='left', fontsize=11)
-    with atomic_file(path) as file:
-        figure.savefig(file, dpi=_DPI)
+    with figure_file(path, TWO_COLUMNS, _HEIGHT * len(clusters.trays)) as figure:
+        parts = figure.subfigures(len(clusters.trays), 1, squeeze=False)[:, 0]
+        for part, (number, tray) in zip(parts, clusters.trays.items(), strict=True):
+            left, right = part.subfigures(1, 2, width_ratios=(1, 1))
+            pairs = left.subplots(2, 2, squeeze=False)
+            ends = tray.snapshots[0], tray.snapshots[-1]
+            for row, snapshot in zip(pairs, ends, strict=True):
+                _draw_snapshot(row, snapshot, pixels_per_metre)
+            _draw_sizes(right.subplots(), tray)
+            part.suptitle(f'tray {number}, cycle {clusters.cycle}', x=0.01, ha='left')
 
 
 def _draw_snapshot(row: NDArray[np.object_], snapshot: Snapshot, scale: float) -> None:
     height, width = snapshot.gray.shape
     half = 0.5 * _MM * width / scale, 0.5 * _MM * height / scale
     row[0].imshow(snapshot.gray, cmap='gray', extent=(0, 2 * half[0], 2 * half[1], 0))
-    row[0].set_title(f'{snapshot.since:.1f} s after shaking', fontsize=9, loc='left')
-    row[0].set_ylabel('[mm]')
+    row[0].set_title(f'{snapshot.since:.1f} s after shaking')
+    row[0].set_ylabel('y [mm]')
     rows, columns = snapshot.values.shape
     step = 2 * half[0] / columns, 2 * half[1] / rows
     x = (np.arange(columns) - columns // 2) * step[0]
     y = (np.arange(rows) - rows // 2) * step[1]
-    row[1].contour(x, y, snapshot.values, levels=_LEVELS, cmap='viridis', linewidths=0.9)
-    row[1].contour(x, y, snapshot.values, levels=[0.5], colors=[_PAPER], linewidths=1.6)
+    row[1].contour(x, y, snapshot.values, levels=_LEVELS, cmap=MAP, linewidths=0.9)
+    row[1].contour(x, y, snapshot.values, levels=[0.5], colors=[VERMILION], linewidths=1.6)
     row[1].set_aspect('equal')
     reach = min(*half, 5.0)
     row[1].set_xlim(-reach, reach)
     row[1].set_ylim(reach, -reach)
-    row[1].set_title('autocorrelation, level 0.5 red', fontsize=9, loc='left')
+    row[1].set_title('autocorrelation')
     row[1].set_xlabel('shift [mm]')
 
 
@@ -93,17 +94,17 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
         tray.column(name) for name in ('cluster_size', 'cluster_size_lower', 'cluster_size_upper')
     )
     if len(tray.truth):
-        axes.plot(*tray.truth[:, :2].T, color=_TRUTH, lw=3.5, alpha=0.7, label='true')
+        axes.plot(*tray.truth[:, :2].T, color=TRUTH, lw=3.5, alpha=0.7, label='true')
     finite = np.isfinite(lower).tolist()
-    axes.fill_between(times, lower, upper, where=finite, color=_OURS, alpha=0.2, lw=0)
-    label = 'calibrated by simulated clusters, band 68 %'
-    axes.plot(times, size, '.-', ms=3, lw=0.8, color=_OURS, label=label)
+    axes.fill_between(times, lower, upper, where=finite, color=MEASURED, alpha=0.2, lw=0)
+    label = 'by simulated clusters, band of 68 %'
+    axes.plot(times, size, '.-', ms=3, lw=0.8, color=MEASURED, label=label)
     paper = tray.paper_sizes()
-    label = f"paper's straight line to {tray.counted():.1f} beads per cluster counted at the end"
-    axes.plot(times, paper, color=_PAPER, lw=1.0, ls='--', label=label)
+    label = f"paper's line to the {tray.counted():.1f} beads per cluster at the end"
+    axes.plot(times, paper, color=VERMILION, lw=1.0, ls='--', label=label)
     for onset, colour, text in (
-        (tray.paper_onset(), _PAPER, "onset by the paper's rule"),
-        (tray.true_onset(), _TRUTH, 'first beads stick'),
+        (tray.paper_onset(), VERMILION, "onset by the paper's rule"),
+        (tray.true_onset(), TRUTH, 'first beads stick'),
     ):
         if math.isfinite(onset):
             axes.axvline(onset, color=colour, lw=1.2, ls=':', label=f'{text}: {onset:.1f} s')
@@ -111,8 +112,8 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
     # Room for the legend.
     axes.set_ylim(0.8, 12.0 * max(np.nanmax(shown, initial=1.0), 3.0))
     axes.set_yscale('log')
-    axes.yaxis.set_major_formatter('{x:g}')
+    plain_numbers(axes.yaxis)
     axes.set_xlabel('time since the shaking event [s]')
-    axes.set_ylabel('cluster size, weight-averaged [beads]')
-    axes.legend(frameon=False, fontsize=8, loc='upper left')
-    axes.grid(alpha=0.25, which='both')
+    axes.set_ylabel('weight-averaged cluster size [beads]')
+    axes.legend(loc='upper left')
+    axes.grid(alpha=0.25, which='major')

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
-from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.table_files import write_rows
 from nanorocks_ros.physics.paper_clusters import (
     PAPER_TABLE_3,
     paper_calibration,
@@ -19,6 +20,8 @@ from nanorocks_ros.records import NS, Autocorrelation, ClusterEstimate, Notice
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.libraries.cluster_films import cluster_sizes
+from nanorocks_ros.studies.results.record_columns import columns_of, record_arrays
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.bead_truth import beads_from_array
 from nanorocks_ros.wire.flat_records import flat_value
@@ -36,22 +39,20 @@ if TYPE_CHECKING:
 _END = 2.0
 # Time after the shaking event at which the beads fly and none sticks yet, [s].
 _FLYING = 0.5
-_COLUMNS = {
-    'tray': '1',
-    'time': 's',
-    'since_shaking': 's',
-    'level_area': 'm^2',
-    'breadth': '1',
-    'axes_ratio': '1',
-    'direction': 'rad',
-    'cluster_size': '1',
-    'cluster_size_error': '1',
-    'cluster_size_lower': '1',
-    'cluster_size_upper': '1',
-    'size_status': '1',
-    'paper_cluster_size': '1',
-    'true_cluster_size': '1',
-}
+_ESTIMATED = (
+    *('level_area', 'breadth', 'axes_ratio', 'direction'),
+    *('cluster_size', 'cluster_size_error', 'cluster_size_lower', 'cluster_size_upper'),
+    'size_status',
+)
+_OF_CLUSTERS = {column.name: column for column in columns_of(ClusterEstimate)}
+_COLUMNS = (
+    Column(name='tray', kind='int64', unit='1', doc='number of the tray'),
+    _OF_CLUSTERS['time'],
+    Column(name='since_shaking', unit='s', doc='time since the shaking event'),
+    *(_OF_CLUSTERS[name] for name in _ESTIMATED),
+    Column(name='paper_cluster_size', unit='1', doc="size by the paper's linear calibration"),
+    Column(name='true_cluster_size', unit='1', doc='true weight-averaged size'),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -272,29 +273,19 @@ def write_clusters(path: Path, clusters: BagClusters) -> None:
     RecordingError
         If the file cannot be written.
     """
-    write_csv(path, list(_COLUMNS), list(_COLUMNS.values()), _rows(clusters))
+    provenance = {**run_provenance(), 'epoch_ns': clusters.epoch_ns}
+    write_rows(path, _COLUMNS, _rows(clusters), provenance)
 
 
 def _rows(clusters: BagClusters) -> Iterator[tuple[object, ...]]:
     for number, tray in clusters.trays.items():
-        paper = tray.paper_sizes().tolist()
-        times, truth = tray.times.tolist(), tray.true_sizes().tolist()
-        for since, by_paper, true, estimate in zip(
-            times, paper, truth, tray.estimates, strict=True
-        ):
-            yield (
-                number,
-                (estimate.stamp_ns - clusters.epoch_ns) / NS,
-                since,
-                estimate.level_area,
-                estimate.breadth,
-                estimate.axes_ratio,
-                estimate.direction,
-                estimate.cluster_size.value,
-                estimate.cluster_size.error,
-                estimate.cluster_size.lower,
-                estimate.cluster_size.upper,
-                estimate.size_status.name.lower(),
-                by_paper,
-                true,
-            )
+        estimated = record_arrays(ClusterEstimate, tray.estimates, clusters.epoch_ns)
+        columns = (
+            estimated['time'],
+            tray.times,
+            *(estimated[name] for name in _ESTIMATED),
+            tray.paper_sizes(),
+            tray.true_sizes(),
+        )
+        for row in zip(*(column.tolist() for column in columns), strict=True):
+            yield number, *row

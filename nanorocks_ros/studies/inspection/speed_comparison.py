@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.table_files import write_rows
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import NS, SpeedEstimate
 from nanorocks_ros.settings import with_values
 from nanorocks_ros.studies.analysis.bag_images import BagImages
+from nanorocks_ros.studies.results.record_columns import columns_of, word_of
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -24,22 +27,22 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 AUTO = 'auto'
+_SPEED = 'mean_projected_speed'
 METHODS = 'tracking', 'structure_function', 'binarised_area'
 """The compared methods; `auto` is the one of them that is selected from the data."""
 
-_COLUMNS = {
-    'tray': '1',
-    'method': '1',
-    'time': 's',
-    'cycle': '1',
-    'since_shaking': 's',
-    'mean_projected_speed': 'm/s',
-    'mean_projected_speed_error': 'm/s',
-    'window': 's',
-    'measured_by': '1',
-    'true_mean_projected_speed': 'm/s',
-    'quality': '1',
-}
+_OF_SPEED = {column.name: column for column in columns_of(SpeedEstimate)}
+_COLUMNS = (
+    Column(name='tray', kind='int64', unit='1', doc='number of the tray'),
+    Column(name='method', kind='string', doc='method that was set', words=(AUTO, *METHODS)),
+    _OF_SPEED['time'],
+    _OF_SPEED['cycle'],
+    Column(name='since_shaking', unit='s', doc='time since the shaking event'),
+    *(_OF_SPEED[name] for name in (_SPEED, f'{_SPEED}_error', 'window')),
+    Column(name='measured_by', kind='string', doc='method that was used', words=METHODS),
+    Column(name=f'true_{_SPEED}', unit='m/s', doc='mean of the truth over the window'),
+    _OF_SPEED['quality'],
+)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -197,7 +200,8 @@ def write_speeds(path: Path, bag_speeds: BagSpeeds) -> None:
     RecordingError
         If the file cannot be written.
     """
-    write_csv(path, list(_COLUMNS), list(_COLUMNS.values()), _rows(bag_speeds))
+    provenance = {**run_provenance(), 'epoch_ns': bag_speeds.epoch_ns}
+    write_rows(path, _COLUMNS, _rows(bag_speeds), provenance)
 
 
 def _rows(bag_speeds: BagSpeeds) -> Iterator[tuple[object, ...]]:
@@ -214,7 +218,7 @@ def _rows(bag_speeds: BagSpeeds) -> Iterator[tuple[object, ...]]:
                     speed.mean_projected_speed.value,
                     speed.mean_projected_speed.error,
                     speed.window,
-                    speed.method.name.lower(),
+                    word_of(speed.method),
                     true,
-                    '+'.join(speed.quality.names()),
+                    word_of(speed.quality),
                 )

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import BLACK, BLUE, GREEN, TRUTH, TWO_COLUMNS, VERMILION
 from nanorocks_ros.records import NS
 from nanorocks_ros.studies.inspection.speed_comparison import AUTO, METHODS
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,12 +25,11 @@ if TYPE_CHECKING:
 
 _MM = 1e3
 _COLOURS = {
-    'tracking': '#1b7837',
-    'structure_function': '#2166ac',
-    'binarised_area': '#c23b22',
+    'tracking': GREEN,
+    'structure_function': BLUE,
+    'binarised_area': VERMILION,
 }
-_TRUTH, _CHOSEN = '#8a8a8a', '#111111'
-_WIDTH, _HEIGHT, _DPI = 12.0, 3.4, 110
+_HEIGHT = 58.0
 # Upper limit of the speed axis, as a multiple of the largest true speed, or of the largest speed
 # by tracking and structure function.
 _HEADROOM = 1.6
@@ -64,23 +61,21 @@ def speeds_figure(path: Path, bag_speeds: BagSpeeds, cycle: int) -> None:
     After [B19] fig. 2.
     """
     has_truth = any(tray.truth for tray in bag_speeds.trays.values())
-    figure = Figure(figsize=(_WIDTH, _HEIGHT * len(bag_speeds.trays) + 0.4), layout='constrained')
-    columns: dict[str, Any] = {'width_ratios': (3, 2)} if has_truth else {}
-    rows = figure.subplots(
-        len(bag_speeds.trays), 1 + has_truth, squeeze=False, sharex=True, **columns
-    )
-    for row, (number, tray) in zip(rows, bag_speeds.trays.items(), strict=True):
-        start_ns = _start_ns(bag_speeds, cycle)
-        _draw_speeds(row[0], tray, cycle, start_ns)
-        row[0].set_title(f'tray {number}, cycle {cycle}', loc='left', fontsize=10)
-        if has_truth:
-            _draw_ratios(row[1], tray, cycle, start_ns)
-    since = 'since the shaking event' if cycle else 'since the beginning'
-    for axes in rows[-1]:
-        axes.set_xlabel(f'time {since} [s]')
-    rows[0, 0].legend(frameon=False, fontsize=8)
-    with atomic_file(path) as file:
-        figure.savefig(file, dpi=_DPI)
+    with figure_file(path, TWO_COLUMNS, _HEIGHT * len(bag_speeds.trays) + 8.0) as figure:
+        columns: dict[str, Any] = {'width_ratios': (3, 2)} if has_truth else {}
+        rows = figure.subplots(
+            len(bag_speeds.trays), 1 + has_truth, squeeze=False, sharex=True, **columns
+        )
+        for row, (number, tray) in zip(rows, bag_speeds.trays.items(), strict=True):
+            start_ns = _start_ns(bag_speeds, cycle)
+            _draw_speeds(row[0], tray, cycle, start_ns)
+            row[0].set_title(f'tray {number}, cycle {cycle}')
+            if has_truth:
+                _draw_ratios(row[1], tray, cycle, start_ns)
+        since = 'since the shaking event' if cycle else 'since the beginning'
+        for axes in rows[-1]:
+            axes.set_xlabel(f'time {since} [s]')
+        rows[0, 0].legend()
 
 
 def _start_ns(bag_speeds: BagSpeeds, cycle: int) -> int:
@@ -104,7 +99,7 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
     if truth:
         values = [_MM * record.mean_projected_speed for record in truth]
         times = [(record.stamp_ns - start_ns) / NS for record in truth]
-        axes.plot(times, values, color=_TRUTH, lw=4, alpha=0.6, label='truth')
+        axes.plot(times, values, color=TRUTH, lw=4, alpha=0.6, label='truth')
         shown += values
     for method in METHODS:
         estimates = _in_cycle(tray, method, cycle)
@@ -122,7 +117,7 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
         [_MM * estimate.mean_projected_speed.value for estimate in chosen],
         '.',
         ms=3.5,
-        color=_CHOSEN,
+        color=BLACK,
         label='chosen from the data',
     )
     if max(shown) > 0.0:
@@ -132,7 +127,7 @@ def _draw_speeds(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
 
 
 def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) -> None:
-    axes.axhspan(1.0 - _TOLERANCE, 1.0 + _TOLERANCE, color=_TRUTH, alpha=0.25, lw=0)
+    axes.axhspan(1.0 - _TOLERANCE, 1.0 + _TOLERANCE, color=TRUTH, alpha=0.25, lw=0)
     for method in METHODS:
         estimates = _in_cycle(tray, method, cycle)
         true = tray.true_speeds(estimates)
@@ -146,5 +141,5 @@ def _draw_ratios(axes: Axes, tray: ComparedSpeeds, cycle: int, start_ns: int) ->
     axes.yaxis.set_major_formatter('{x:g}')
     axes.yaxis.set_minor_locator(mpl.ticker.NullLocator())
     axes.set_ylabel('estimate / truth')
-    axes.set_title(f'grey: within {100 * _TOLERANCE:.0f} %', loc='left', fontsize=10)
+    axes.set_title(f'grey: within {100 * _TOLERANCE:.0f} %')
     axes.grid(alpha=0.25)

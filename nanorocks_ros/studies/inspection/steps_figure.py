@@ -5,17 +5,15 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import cv2
-import matplotlib as mpl
 import numpy as np
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import TWO_COLUMNS, YELLOW, scale_bar
 from nanorocks_ros.studies.inspection.track_overlay import overlay
-
-mpl.use('Agg')
-from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,11 +25,13 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import SpeedSettings
     from nanorocks_ros.studies.inspection.preprocessing_steps import FrameSteps, TraySteps
 
-_WIDTH, _COLUMNS, _DPI = 15.0, 4, 110
-# Height of the title of a panel and of the headline of a tray, [in].
-_TITLE, _HEADLINE = 0.45, 0.35
-_MM2 = 1e6
-_EDGE = '#3cdc3c'
+_COLUMNS = 4
+# Height of the title of a panel and of the headline of a tray, [mm].
+_TITLE, _HEADLINE = 10.0, 8.0
+# Letters of a line of a title.
+_TITLE_WIDTH = 34
+_MM, _MM2 = 1e3, 1e6
+_EDGE = YELLOW
 _AVERAGES = {
     'none': 'two frames, subtracted',
     'running_mean': 'running means of {} frames, subtracted',
@@ -60,22 +60,22 @@ def steps_figure(path: Path, steps: FrameSteps, settings: SpeedSettings) -> None
     """
     panels = [_panels(tray, settings) for tray in steps.trays.values()]
     heights = [_height(tray) for tray in steps.trays.values()]
-    figure = Figure(figsize=(_WIDTH, sum(heights)), layout='constrained')
-    parts: Any = figure.subfigures(len(panels), 1, height_ratios=heights, squeeze=False)
-    for part, tray, drawn in zip(parts[:, 0], steps.trays.values(), panels, strict=True):
-        part.suptitle(_headline(tray, steps), fontsize=11, x=0.01, ha='left', weight='bold')
-        axes = part.subplots(2, _COLUMNS, squeeze=False).ravel()
-        for panel, (title, draw) in zip(axes, drawn, strict=True):
-            panel.set_title(title, fontsize=9, loc='left')
-            panel.set_axis_off()
-            draw(panel)
-    with atomic_file(path) as file:
-        figure.savefig(file, dpi=_DPI)
+    with figure_file(path, TWO_COLUMNS, sum(heights)) as figure:
+        parts: Any = figure.subfigures(len(panels), 1, height_ratios=heights, squeeze=False)
+        for part, tray, drawn in zip(parts[:, 0], steps.trays.values(), panels, strict=True):
+            part.suptitle(_headline(tray, steps), x=0.01, ha='left', weight='bold')
+            axes = part.subplots(2, _COLUMNS, squeeze=False).ravel()
+            for panel, (title, draw) in zip(axes, drawn, strict=True):
+                panel.set_title(textwrap.fill(title, _TITLE_WIDTH), fontsize=7.0)
+                panel.set_axis_off()
+                draw(panel)
+            # Of the straightened picture; the one as filmed has no single scale.
+            scale_bar(axes[1], tray.pixels_per_metre / _MM)
 
 
 def _height(steps: TraySteps) -> float:
     rows, columns = steps.raw.shape[:2]
-    panel = _TITLE + _WIDTH / _COLUMNS * rows / columns
+    panel = _TITLE + TWO_COLUMNS / _COLUMNS * rows / columns
     return float(_HEADLINE + 2.0 * panel)
 
 

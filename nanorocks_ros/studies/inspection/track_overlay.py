@@ -31,11 +31,15 @@ _COLOURS = (
     (200, 255, 200),
 )
 _HIDDEN = (255, 0, 255)
+MAGNIFICATION = 3
+"""Pixels of an overlay for each of the image, unless told otherwise."""
+
 # Fractional bits of the coordinates that are passed to OpenCV.
 _SHIFT = 4
 _GAP_PX = 12
 # Width of the outline of a bead; paths are thinner.
 _OUTLINE_PX = 2
+_WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 
 
 def overlay(
@@ -43,7 +47,7 @@ def overlay(
     tracks: Sequence[Tracks],
     pixels_per_metre: float,
     *,
-    magnification: int = 3,
+    magnification: int = MAGNIFICATION,
     path_frames: int = 30,
 ) -> NDArray[np.uint8]:
     """Draw the beads of one image and their paths.
@@ -75,6 +79,29 @@ def overlay(
             points = np.round(positions * scale - 2 ** (_SHIFT - 1)).astype(np.int32)
             cv2.polylines(canvas, [points], False, _colour(number), 1, cv2.LINE_AA, _SHIFT)
         _draw_beads(canvas, tracks[-1], scale)
+    return np.asarray(canvas, dtype=np.uint8)
+
+
+def with_scale_bar(picture: NDArray[np.uint8], pixels_per_metre: float) -> NDArray[np.uint8]:
+    """The picture with a bar of a round length in its lower left corner.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, (rows, columns, 3), bgr
+    pixels_per_metre : float, [px/m]
+        Scale of the picture itself, with its magnification.
+    """
+    from nanorocks_ros.outputs.figure_style import bar_length
+
+    rows, columns = picture.shape[:2]
+    length = bar_length(1e3 * columns / pixels_per_metre)
+    canvas: Any = picture.copy()
+    left, bottom = columns // 25, rows - rows // 25
+    right, size = left + round(1e-3 * length * pixels_per_metre), max(columns / 1000.0, 0.45)
+    for colour, more in ((_BLACK, 2), (_WHITE, 0)):
+        cv2.line(canvas, (left, bottom), (right, bottom), colour, 3 + 2 * more)
+        cv2.putText(canvas, f'{length:g} mm', (left, bottom - 8), cv2.FONT_HERSHEY_SIMPLEX, size,
+                    colour, 1 + more, cv2.LINE_AA)  # fmt: skip
     return np.asarray(canvas, dtype=np.uint8)
 
 

@@ -15,9 +15,13 @@ from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
-from nanorocks_ros.studies.inspection.track_overlay import overlay, write_overlay
+from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
-from nanorocks_ros.studies.measure.measure_report import MeasuredTray, write_measure_report
+from nanorocks_ros.studies.measure.measure_report import (
+    DECAY_NOT_READ,
+    MeasuredTray,
+    write_measure_report,
+)
 from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
@@ -28,6 +32,9 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.settings import PipelineSettings
@@ -37,6 +44,7 @@ MARK = 'measured.json'
 """File of a folder of results; it marks the folder, and holds the numbers."""
 
 _TRACKS, _TABLE, _PICTURE = 'tracks.npz', 'tracks.csv', 'tracks.png'
+_MAGNIFICATION = 2
 
 
 class Teller(Protocol):
@@ -88,11 +96,14 @@ class Measured:
     usable : bool
         Whether the beads were recognised well enough.
     report : Path
+    tracked : TrackedBag
+        The tracks; without pictures where they are those of an earlier run.
     """
 
     trays: tuple[MeasuredTray, ...]
     usable: bool
     report: Path
+    tracked: TrackedBag
 
 
 def check_measure_folder(folder: Path) -> None:
@@ -137,7 +148,7 @@ def measure_film(plan: MeasurePlan, teller: Teller) -> Measured:
     content = {'film': plan.name, 'usable': tracked.usable, 'trays': values}
     write_bytes(plan.folder / MARK, (json.dumps(content, indent=1) + '\n').encode())
     write_measure_report(report, plan.name, tracked, trays, plan.folder / _PICTURE)
-    return Measured(trays=trays, usable=tracked.usable, report=report)
+    return Measured(trays=trays, usable=tracked.usable, report=report, tracked=tracked)
 
 
 def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
@@ -155,13 +166,28 @@ def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
     for notice in tracked.notices:
         teller.say(notice)
     write_tracks(plan.folder / _TABLE, tracked)
-    pictures = [
-        overlay(image, tracked.tracks[number], tracked.pixels_per_metre, magnification=2)
-        for number, image in sorted(tracked.pictures.items())
-    ]
-    write_overlay(plan.folder / _PICTURE, pictures)
+    write_overlay(plan.folder / _PICTURE, _pictures(plan, tracked))
     save_tracks(archive, tracked, key)
     return tracked
+
+
+def _pictures(plan: MeasurePlan, tracked: TrackedBag) -> list[NDArray[np.uint8]]:
+    """The last frame of each tray with its tracks, and a scale bar where a length is known."""
+    scale = tracked.pixels_per_metre
+    pictures = [
+        overlay(image, tracked.tracks[number], scale, magnification=_MAGNIFICATION)
+        for number, image in sorted(tracked.pictures.items())
+    ]
+    if _length_unit(plan).name == 'px':
+        return pictures
+    return [with_scale_bar(picture, _MAGNIFICATION * scale) for picture in pictures]
+
+
+def _length_unit(plan: MeasurePlan) -> LengthUnit:
+    film = film_section(plan.settings.trays_file)
+    if film is not None and not film.scale_known:
+        return LengthUnit('px', film.pixels_per_metre)
+    return LengthUnit()
 
 
 def _measured_tray(
@@ -172,9 +198,7 @@ def _measured_tray(
     film = film_section(plan.settings.trays_file)
     height_known = not math.isnan(tray.dimensions[2])
     known = height_known and (film is None or film.container_known)
-    unit = LengthUnit()
-    if film is not None and not film.scale_known:
-        unit = LengthUnit('px', film.pixels_per_metre)
+    unit = _length_unit(plan)
     for verdict in tracked.verdicts[number]:
         for line in verdict.lines():
             teller.say(line)
@@ -213,7 +237,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     """What the decay of the speeds says, or why it is not read."""
     reason = step.reason_against
     if reason:
-        return [f'decay: not read; {reason}']
+        return [f'{DECAY_NOT_READ}; {reason}']
     number = step.tray.number
     key = tracking_key(plan.bag, plan.settings, plan.image_topic)
     note = plan.folder / f'tray_{number}_decay.json'
@@ -226,7 +250,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     except RecordingError:
         raise
     except NanorocksError as error:
-        return [f'decay: not read; {error}']
+        return [f'{DECAY_NOT_READ}; {error}']
     said = {line for verdict in step.verdicts for line in verdict.lines()}
     lines = [
         f'decay: {line.strip()}'

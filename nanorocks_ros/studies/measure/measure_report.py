@@ -8,8 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros import __version__
-from nanorocks_ros.outputs.html_report import Picture, Section, Table, number, write_report
+from nanorocks_ros.outputs.html_report import (
+    Picture,
+    Section,
+    Table,
+    made_line,
+    number,
+    write_report,
+)
 from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.measure.measure_figure import measure_figure
@@ -23,6 +29,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.measure.measured_words import LengthUnit
     from nanorocks_ros.studies.measure.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
+
+DECAY_NOT_READ = 'decay: not read'
+"""How the line begins that says why the decay is not read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +55,11 @@ class MeasuredTray:
     recognition: tuple[str, ...]
     lines: tuple[str, ...]
     decay: tuple[str, ...]
+
+    @property
+    def decay_read(self) -> bool:
+        """Whether there are results of the decay, in the folder of the tray."""
+        return bool(self.decay) and not self.decay[0].startswith(DECAY_NOT_READ)
 
     def as_json(self) -> dict[str, Any]:
         """Numbers in s and m, or px where no length is known; None where unknown; all lines."""
@@ -83,6 +97,8 @@ def _plain(value: RestitutionOfContacts, scale: float) -> dict[str, Any]:
         'restitution_error': interval.error,
         'restitution_lower': interval.lower,
         'restitution_upper': interval.upper,
+        'restitution_lower_68': value.lower_68,
+        'restitution_upper_68': value.upper_68,
         'speed': scale * value.speed,
     }
 
@@ -124,9 +140,19 @@ def write_measure_report(
         *(_tray_section(path.parent, tray) for tray in trays),
         Section(title='What was said on the way', parts=list(tracked.notices)),
     ]
-    usable = 'usable' if tracked.usable else 'NOT USABLE: see the first section'
-    summary = f'{counted(tracked.frames, "frame")}; {usable}. nanorocks_ros {__version__}.'
-    write_report(path, f'Measured: {film}', summary, sections)
+    made = f'{made_line()} {counted(tracked.frames, "frame")}.'
+    conclusion = _conclusion(trays, usable=tracked.usable)
+    write_report(path, f'Measured: {film}', conclusion, sections, made)
+
+
+def _conclusion(trays: tuple[MeasuredTray, ...], *, usable: bool) -> str:
+    """Whether the film can be used, and the restitutions of each tray."""
+    lines = [] if usable else ['NOT USABLE: see the first section.']
+    for tray in trays:
+        alone = tray.contacts.alone
+        beads, walls = (restitution_text(kind, tray.unit) for kind in (alone.beads, alone.walls))
+        lines.append(f'Tray {tray.number}: restitution of two beads {beads}; of walls {walls}.')
+    return ' '.join([*lines, 'By contacts alone, with intervals of 95 %.'])
 
 
 def _tray_section(folder: Path, tray: MeasuredTray) -> Section:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +27,12 @@ _BINS = 200
 _LEAST_FRAMES = 3
 # Part of the film at each end whose speeds are told.
 _END = 0.05
+_COLUMNS = (
+    Column(name='time', unit='s', doc='middle of the bin, since the first frame'),
+    Column(name='mean_speed', unit='m/s', doc='mean projected speed of the beads'),
+    Column(name='rms_speed', unit='m/s', doc='root mean square of the projected speed'),
+    Column(name='beads', unit='1', doc='mean number of beads with a known speed'),
+)
 
 
 class TrackSpeeds(NamedTuple):
@@ -81,4 +89,4 @@ def write_speeds(path: Path, speeds: TrackSpeeds) -> None:
         When it cannot be written.
     """
     rows = np.column_stack(speeds).tolist()
-    write_csv(path, ('time', 'mean_speed', 'rms_speed', 'beads'), ('s', 'm/s', 'm/s', '1'), rows)
+    write_rows(path, _COLUMNS, rows, run_provenance())

@@ -6,11 +6,9 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 from __future__ import annotations
 
 import shlex
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from nanorocks_ros import __version__
-from nanorocks_ros.outputs.html_report import Section, Table
+from nanorocks_ros.outputs.html_report import Section, Table, made_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,34 +69,36 @@ def summary(folder: Path, plan: CampaignPlan, runs: int) -> str:
     runs : int
         Simulated runs at each point of a search.
     """
-    made = datetime.now(UTC).strftime('%Y-%m-%d %H:%M UTC')
     cycles = 'cycle' if plan.cycles == 1 else 'cycles'
     command = (
         f'nanorocks reproduce --cycles {plan.cycles} --runs {runs} --seed {plan.seed} '
         f'--sticking-speed {plan.sticking_speed:g} -o {shlex.quote(str(folder))}'
     )
     return (
-        f'Made on {made} with nanorocks_ros {__version__} by `{command}`: {plan.cycles} {cycles} '
+        f'{made_line(command)} {plan.cycles} {cycles} '
         f'without and {plan.cycles} with sticking, {plan.seconds:g} s of film each; {runs} runs '
         'at each point of the searches.'
     )
 
 
-def conclusion(chapters: Sequence[Chapter]) -> Section:
-    """What follows from the chapters, in one paragraph, and the table of differences."""
+def conclusion(chapters: Sequence[Chapter]) -> str:
+    """What follows from the chapters, in one paragraph."""
     findings = [finding for chapter in chapters for finding in chapter.findings]
+    return ' '.join(
+        [
+            'The methods of the paper were repeated on simulated films with a known truth. Their '
+            'values test the methods; of the beads of the flight they say nothing.',
+            *findings,
+            'Each chapter says where the paper errs and why.',
+        ]
+    )
+
+
+def differences(chapters: Sequence[Chapter]) -> Section:
+    """The table of differences to the paper."""
     return Section(
-        title='Conclusion, and differences to the paper',
+        title='Differences to the paper',
         parts=[
-            ' '.join(
-                [
-                    'The methods of the paper were repeated on simulated films with a known '
-                    'truth. Their values test the methods; of the beads of the flight they say '
-                    'nothing.',
-                    *findings,
-                    'Each chapter says where the paper errs and why.',
-                ]
-            ),
             Table(
                 head=('', 'the paper', 'its method, on our films', 'ours', 'truth'),
                 rows=[row for chapter in chapters for row in chapter.differences],

@@ -24,7 +24,7 @@ from nanorocks_ros.studies.reproduction.chapters.restitution_chapter import (
 from nanorocks_ros.studies.reproduction.chapters.rotation_chapter import rotation_chapter
 from nanorocks_ros.studies.reproduction.chapters.simulation_chapter import simulation_chapter
 from nanorocks_ros.studies.reproduction.chapters.speed_chapter import speed_chapter
-from nanorocks_ros.studies.reproduction.report_head import conclusion, limits, summary
+from nanorocks_ros.studies.reproduction.report_head import conclusion, differences, limits, summary
 from nanorocks_ros.studies.reproduction.simulated_campaign import prepare_campaign, run_campaign
 
 if TYPE_CHECKING:
@@ -106,8 +106,9 @@ def reproduce(
     write_report(
         path,
         'NanoRocks, reproduced',
-        summary(folder, plan, runs),
-        [conclusion(chapters), limits(), *(chapter.section for chapter in chapters)],
+        conclusion(chapters),
+        [differences(chapters), limits(), *(chapter.section for chapter in chapters)],
+        made=summary(folder, plan, runs),
     )
     return path
 

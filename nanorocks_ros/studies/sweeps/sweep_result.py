@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.json_values import parse_object
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
+from nanorocks_ros.outputs.table_columns import Column, float_columns
+from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.studies.results.run_provenance import run_provenance
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
 from nanorocks_ros.studies.sweeps.sweep_plan import Axis
 
@@ -21,11 +23,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.outputs.json_values import parse_object
+    from nanorocks_ros.outputs.table_columns import Kind
 from nanorocks_ros.outputs.npz_archive import Arrays
 
 CURVES = ('mean_speed', 'mean_speed_error', 'mean_projected_speed', 'mean_projected_speed_error')
 _RUNS = ('run_mean_speed', 'run_mean_projected_speed')
 _SPECIFICATION, _TIMES, _AXIS = 'question', 'times', 'axis_'
+
+
+# By the type of the values of an axis; whole numbers count as numbers where one is not whole.
+_KINDS: dict[type, Kind] = {bool: 'bool', int: 'int64', str: 'string'}
+
+
+def _axis_column(axis: Axis, unit: str) -> Column:
+    types = {type(value) for value in axis.values}
+    kind = _KINDS.get(types.pop(), 'float64') if len(types) == 1 else 'float64'
+    return Column(name=axis.name, kind=kind, unit=unit if kind in ('int64', 'float64') else '')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,10 +171,10 @@ class Sweep:
         RecordingError
             When the file cannot be written.
         """
-        names = [axis.name for axis in self.axes]
-        write_csv(
-            path,
-            [*names, 'time', *CURVES],
-            [*(units.get(name) or '1' for name in names), 's', *('m/s' for _ in CURVES)],
-            self.rows(),
-        )
+        curves = ['time', *CURVES]
+        columns = [
+            *(_axis_column(axis, units.get(axis.name) or '1') for axis in self.axes),
+            *float_columns(curves, ['s', *('m/s' for _ in CURVES)]),
+        ]
+        provenance = {**run_provenance(), 'sweep': parse_object(self.specification)}
+        write_rows(path, columns, self.rows(), provenance)

@@ -88,7 +88,7 @@ def film_into_bag(
         topics.RAW_COMPRESSED.absolute(): offered_topic(topics.RAW_COMPRESSED),
         truth_topic: offered_topic(topics.TRUTH),
     }
-    labels = [field.name for field in layout(GroundTruth).fields]
+    labels = layout(GroundTruth).labels
     provenance = {
         'nanorocks_ros': __version__,
         **{row.name: str(row.default) for row in rows(settings)},

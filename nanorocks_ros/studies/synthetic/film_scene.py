@@ -209,7 +209,7 @@ def _write(bag: BagWriter, moment: SceneMoment, jpeg: bytes) -> None:
     stamp_ns = moment.frame.stamp_ns
     picture = compressed_image_message(stamp_ns, 'camera', 'bgr8; jpeg compressed bgr8', jpeg)
     bag.write(topics.RAW_COMPRESSED.absolute(), stamp_ns, picture)
-    labels = [field.name for field in layout(GroundTruth).fields]
+    labels = layout(GroundTruth).labels
     for truth in moment.trays:
         values = to_array(truth, START_NS)
         name = topics.TRUTH.absolute(truth.tray)

@@ -4,45 +4,42 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-
-from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.studies.synthetic.simulated_plan import shown_times
-
-mpl.use('Agg')
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import BLACK, FITTED, MAP, SKY, TWO_COLUMNS, plain_numbers
+from nanorocks_ros.studies.synthetic.simulated_plan import shown_times
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
 
 _MM = 1e3
-_RUN, _MEAN, _MARK = '#8fa8bf', '#c23b22', '#30506f'
-_COLOURS = 'viridis'
+_RUN, _MEAN, _MARK = SKY, FITTED, BLACK
 # Trays of a larger ratio of length to width are drawn in two columns.
 _LONG_ASPECT = 1.8
 # Powers of ten in the colour scale of speeds.
 _DECADES = 2
-# Width of the figure and height of its lower panel, [in].
-_WIDTH, _DECAY_HEIGHT = 10.0, 3.6
+# Height of the lower panel, [mm], and of the labels of a tray.
+_DECAY_HEIGHT = 72.0
 _FLOOR = '#e9ecef'
 
 
-def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
+def simulated_figure(path: Path | None, simulated: SimulatedRuns) -> Figure:
     """Draw the beads of the first run from above, coloured by speed, and the decay of all runs.
 
     Parameters
     ----------
-    path : Path
+    path : Path or None
+        None: the figure is not written.
     simulated : SimulatedRuns
         Of a plan that keeps the first run at `shown_times`, or the trajectory.
 
@@ -59,14 +56,13 @@ def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
     length, width, _ = simulated.plan.tray.dimensions
     columns = min(len(shown_indices), 2 if length > _LONG_ASPECT * width else len(shown_indices))
     rows = -(-len(shown_indices) // columns)
-    trays_height = rows * (_WIDTH / columns * width / length + 0.4)
-    figure = Figure(figsize=(_WIDTH, trays_height + _DECAY_HEIGHT), layout='constrained')
-    panels: Any = figure.subfigures(2, 1, height_ratios=(trays_height, _DECAY_HEIGHT))
-    trays = panels[0].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    _draw_trays(trays, simulated, shown_indices)
-    _draw_decay(panels[1].subplots(), simulated, shown_indices)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    trays_height = rows * (TWO_COLUMNS / columns * width / length + 10.0)
+    with figure_file(path, TWO_COLUMNS, trays_height + _DECAY_HEIGHT) as figure:
+        panels: Any = figure.subfigures(2, 1, height_ratios=(trays_height, _DECAY_HEIGHT))
+        trays = panels[0].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        _draw_trays(trays, simulated, shown_indices)
+        _draw_decay(panels[1].subplots(), simulated, shown_indices)
+    return figure
 
 
 def _draw_trays(
@@ -80,7 +76,7 @@ def _draw_trays(
     for axes, k in zip(trays.ravel(), shown, strict=False):
         index = kept.index(k)
         axes.add_collection(_beads(axes, run, index, speeds[index], norm))
-        axes.set_title(f't = {plan.times[k]:.3g} s', fontsize=10)
+        axes.set_title(f't = {plan.times[k]:.3g} s')
         axes.set_aspect('equal')
         axes.set_facecolor(_FLOOR)
         axes.set_xlim(0.0, plan.tray.dimensions[0] * _MM)
@@ -93,10 +89,10 @@ def _draw_trays(
     for axes in trays[:, 0]:
         axes.set_ylabel('y [mm]')
     bar = trays[0, 0].figure.colorbar(
-        ScalarMappable(norm=norm, cmap=_COLOURS), ax=trays, extend='min', pad=0.01
+        ScalarMappable(norm=norm, cmap=MAP), ax=trays, extend='min', pad=0.01
     )
     bar.set_label('speed [mm/s]')
-    _label_plain_numbers(bar.ax)
+    plain_numbers(bar.ax.yaxis)
 
 
 def _beads(
@@ -112,7 +108,7 @@ def _beads(
         units='xy',
         offsets=run.positions[index, order, :2] * _MM,
         offset_transform=axes.transData,
-        cmap=_COLOURS,
+        cmap=MAP,
         norm=norm,
         edgecolors='white',
         linewidths=0.4,
@@ -150,23 +146,15 @@ def _draw_decay(axes: Axes, simulated: SimulatedRuns, shown: tuple[int, ...]) ->
     axes.set_xlim(0.0, simulated.plan.duration)
     if mean.min() > 0.0:
         axes.set_yscale('log')
-        _label_plain_numbers(axes)
+        plain_numbers(axes.yaxis)
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('mean speed of the beads [mm/s]')
     settings = simulated.plan.settings
     axes.set_title(
         f'Tray {settings.tray}: {simulated.plan.tray.count} beads, restitution '
         f'{settings.restitution:g}, walls {settings.wall_restitution:g}, seed {settings.seed}',
-        fontsize=10,
     )
-    handles: Any = axes.legend(frameon=False).legend_handles
+    handles: Any = axes.legend().legend_handles
     for handle in handles:
         handle.set_alpha(1.0)
     axes.grid(alpha=0.25)
-
-
-def _label_plain_numbers(axes: Axes) -> None:
-    """Label a logarithmic axis with plain numbers: 0.5, 1, 2."""
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter('{x:g}')
-    axes.yaxis.set_minor_formatter(NullFormatter())

@@ -8,29 +8,34 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.outputs.parquet import Column, write_parquet
+from nanorocks_ros.outputs.parquet import write_parquet
+from nanorocks_ros.outputs.table_columns import Column
 from nanorocks_ros.simulation.initial_state import inventory
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
 
+    Table = tuple[tuple[Column, ...], Iterator[dict[str, NDArray[Any]]]]
+
 TABLES = '.npz', '.parquet'
 """Suffixes of these files."""
 
 _AXES = 'xyz'
 _EVENT_COLUMNS = (
-    Column(name='run', kind='i4'),
-    Column(name='time', kind='f8', unit='s'),
-    Column(name='type', kind='text'),
-    Column(name='bead', kind='i4'),
-    Column(name='partner', kind='i4'),
-    Column(name='normal_speed', kind='f8', unit='m/s'),
-    Column(name='impulse', kind='f8', unit='kg m/s'),
+    Column(name='run', kind='int32', unit='1', doc='number of the run'),
+    Column(name='time', unit='s', doc='since the shaking event'),
+    Column(name='type', kind='string', doc='pair, wall, merge or fix'),
+    Column(name='bead', kind='int32', unit='1', doc='number of the bead'),
+    Column(
+        name='partner', kind='int32', unit='1', doc='bead, or wall: 0 to 5, low and high x, y, z'
+    ),
+    Column(name='normal_speed', unit='m/s', doc='along the normal, before'),
+    Column(name='impulse', unit='kg m/s', doc='exchanged along the normal'),
 )
 # Fields of the engine that have other names than their columns.
 _FIELDS = {'type': 'kind'}
@@ -60,8 +65,7 @@ def write_trajectory(path: Path, simulated: SimulatedRuns) -> None:
         When the file cannot be written.
     """
     if path.suffix == '.parquet':
-        pieces = (_bead_rows(simulated, run) for run in simulated.runs)
-        write_parquet(path, _bead_columns(simulated), pieces, simulated.provenance())
+        write_parquet(path, *trajectory_table(simulated), simulated.provenance())
     else:
         _write_arrays(path, _bead_arrays(simulated))
 
@@ -85,17 +89,28 @@ def write_events(path: Path, simulated: SimulatedRuns) -> None:
     RecordingError
         When the file cannot be written.
     """
-    pieces = (_event_rows(run) for run in simulated.runs)
+    columns, pieces = event_table(simulated)
     if path.suffix == '.parquet':
-        write_parquet(path, _EVENT_COLUMNS, pieces, simulated.provenance())
+        write_parquet(path, columns, pieces, simulated.provenance())
         return
     rows = list(pieces)
 
     def joined(name: str) -> Callable[[], Any]:
         return lambda: np.concatenate([row[name] for row in rows])
 
-    arrays = {column.name: joined(column.name) for column in _EVENT_COLUMNS}
+    arrays = {column.name: joined(column.name) for column in columns}
     _write_arrays(path, {**arrays, 'provenance': lambda: np.array(simulated.provenance())})
+
+
+def trajectory_table(simulated: SimulatedRuns) -> Table:
+    """Columns and rows of the beads of every run at every time, run by run."""
+    pieces = (_bead_rows(simulated, run) for run in simulated.runs)
+    return _bead_columns(simulated), pieces
+
+
+def event_table(simulated: SimulatedRuns) -> Table:
+    """Columns and rows of every collision of every run, run by run."""
+    return _EVENT_COLUMNS, (_event_rows(run) for run in simulated.runs)
 
 
 def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
@@ -143,23 +158,29 @@ def _write_arrays(path: Path, arrays: dict[str, Callable[[], Any]]) -> None:
 
 
 def _bead_columns(simulated: SimulatedRuns) -> tuple[Column, ...]:
-    vectors = [('', 'm'), ('v', 'm/s')]
+    vectors = [('', 'm', 'position'), ('v', 'm/s', 'velocity')]
     if simulated.runs[0].spins is not None:
-        vectors.append(('w', 'rad/s'))
-    drag = [] if simulated.runs[0].drag is None else [Column(name='drag', kind='f8', unit='1/s')]
+        vectors.append(('w', 'rad/s', 'angular velocity'))
+    drag = (
+        []
+        if simulated.runs[0].drag is None
+        else [Column(name='drag', unit='1/s', doc='of the gas on the bead')]
+    )
     return (
-        Column(name='run', kind='i4'),
-        Column(name='time', kind='f8', unit='s'),
-        Column(name='id', kind='i4'),
-        Column(name='body', kind='i4'),
-        Column(name='species', kind='i4'),
-        Column(name='material', kind='text'),
-        Column(name='radius', kind='f8', unit='m'),
-        Column(name='mass', kind='f8', unit='kg'),
+        Column(name='run', kind='int32', unit='1', doc='number of the run'),
+        Column(name='time', unit='s', doc='since the shaking event'),
+        Column(name='id', kind='int32', unit='1', doc='number of the bead'),
+        Column(
+            name='body', kind='int32', unit='1', doc='smallest number of a bead that moves with it'
+        ),
+        Column(name='species', kind='int32', unit='1', doc='0 for the first of the tray'),
+        Column(name='material', kind='string', doc='of the bead'),
+        Column(name='radius', unit='m', doc='of the bead'),
+        Column(name='mass', unit='kg', doc='of the bead'),
         *drag,
         *(
-            Column(name=f'{letter}{axis}', kind='f8', unit=unit)
-            for letter, unit in vectors
+            Column(name=f'{letter}{axis}', unit=unit, doc=f'{meaning} along {axis}')
+            for letter, unit, meaning in vectors
             for axis in _AXES
         ),
     )

@@ -1,4 +1,4 @@
-"""Pages of the documentation that are generated: topics, array layouts, parameters, flags.
+"""Pages of the documentation that are generated: topics, array layouts, parameters, flags, Python.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 from nanorocks_ros import settings as st
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import FLAGS
+from nanorocks_ros.tools.docs_pages.python_page import python_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
+from nanorocks_ros.wire.layout_fields import array_elements
 from nanorocks_ros.wire.products import PRODUCTS
 
 if TYPE_CHECKING:
@@ -96,8 +98,12 @@ def topics_page() -> str:
         '`/clock`.\n\n# Array layouts\n\n'
         'The arrays are `std_msgs/Float32MultiArray`: `layout.dim[0].label` holds the field '
         'names, separated by commas. SI units; NaN means "not known yet". `epoch` tells what '
-        '`time` counts from. Read from `msg_defs/nanorocks_msgs/msg/`, which also builds as an '
-        'interface package.\n'
+        '`time` counts from. A time takes two elements, since float32 resolves 8 ms after a day: '
+        'add `NAME_remainder`, at the end, to `NAME`; the sum is exact to some nanoseconds. Read '
+        'from `msg_defs/nanorocks_msgs/msg/`, which also builds as an interface package. Where '
+        'it is installed, each record is also published as a message of its own type on '
+        '`tray_K/typed/...` (the latched `cor` always, others while somebody subscribes): with '
+        'a header, integer codes and their words.\n'
     )
     for product in PRODUCTS:
         array = layout(product.record)
@@ -106,7 +112,7 @@ def topics_page() -> str:
             ('element', 'field', 'unit', 'meaning'),
             (
                 (str(index), f'`{field.name}`', field.unit, field.doc)
-                for index, field in enumerate(array.fields)
+                for index, field in enumerate(array.elements)
             ),
         )
         if array.constants:
@@ -118,14 +124,15 @@ def topics_page() -> str:
 def _beads_section() -> str:
     """The array whose length is that of the list of beads."""
     array = beads_layout()
-    head, row = len(array.head), len(array.bead)
+    elements = array_elements(array.head)
+    head, row = len(elements), len(array.bead)
     text = f'\n## BeadsTruth\n\n{array.doc}\n\n'
     text += (
         f'{head} elements (`layout.dim[0]`), then {row} for each bead (`dim[1]`: how many beads, '
         '`dim[2]`: the names); a bead keeps its row, which is its identity.\n\n'
     )
     fields = [
-        *((str(index), field) for index, field in enumerate(array.head)),
+        *((str(index), field) for index, field in enumerate(elements)),
         *((f'{head + index} + {row} i', field) for index, field in enumerate(array.bead)),
     ]
     return text + _table(
@@ -188,6 +195,7 @@ FILES = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
     'docs/reference/flags.md': flags_page,
+    'docs/reference/python.md': python_page,
 }
 
 

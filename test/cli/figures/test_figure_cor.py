@@ -19,6 +19,7 @@ from decays import simulated_mixture, simulated_table, write_rows
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 
 SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
 FIGURES = ('decay.png', 'walls.png', 'width.png', 'cor_against_speed.png')
@@ -149,7 +150,7 @@ def test_the_window_is_that_of_the_analysis(table, tmp_path, capsys):
     fields = ('status', 'window_start', 'window_end', 'cooling_start')
     # The third is a live estimate.
     rows = [(2, 4.0, 18.0, 2.25), (2, 4.5, 19.0, 2.75), (1, 9.0, 9.0, 9.0), (2, 4.4, 17.0, 2.5)]
-    write_csv(tmp_path / 'tray_1_cor.csv', fields, ('1', 's', 's', 's'), rows)
+    write_csv(tmp_path / 'tray_1_cor.csv', float_columns(fields, ('1', 's', 's', 's')), rows)
     assert draw(speeds, tmp_path / 'a', '--json') == 0
     values = json.loads(capsys.readouterr().out)
     assert (values['first'], values['last']) == (4.4, 18.0)
@@ -160,8 +161,9 @@ def test_an_oscillating_tray_is_fitted_from_the_start_of_the_cooling(table, tmp_
     oscillating.write_bytes(table.read_bytes())
     write_csv(
         tmp_path / 'tray_1_cor.csv',
-        ('status', 'window_start', 'window_end', 'cooling_start'),
-        ('1', 's', 's', 's'),
+        float_columns(
+            ('status', 'window_start', 'window_end', 'cooling_start'), ('1', 's', 's', 's')
+        ),
         [(2, 8.0, 20.0, 6.25)],
     )
     values = {}

@@ -8,8 +8,10 @@ import cv2
 import numpy as np
 import pytest
 from decays import simulated_table, write_rows
+from matplotlib.colors import to_rgb
 
 from nanorocks_ros.cli.main import main
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, PAPER
 
 
 @pytest.fixture(scope='module')
@@ -19,6 +21,10 @@ def table(tmp_path_factory):
 
 def draw(kind, table, output, *more):
     return main(['figure', kind, str(table), '-o', str(output), *more])
+
+
+def bgr(colour):
+    return tuple(round(255 * part) for part in to_rgb(colour))[::-1]
 
 
 def colours(path):
@@ -35,8 +41,7 @@ def test_the_decay_is_drawn_with_both_fits(table, tmp_path, capsys):
     assert values['confined_error'] < 0.02
     # The closed form of the paper for a gas of restitution 0.89.
     assert 0.96 < values['paper'] < 0.99
-    # The two fits, in blue, green, red.
-    assert {(0x22, 0x3B, 0xC2), (0x3C, 0xB9, 0xE8)} <= colours(tmp_path / 'a.png')
+    assert {bgr(FITTED), bgr(PAPER)} <= colours(tmp_path / 'a.png')
 
 
 def test_the_restitution_is_drawn_with_the_effect_of_noise(table, tmp_path, capsys):
@@ -46,7 +51,7 @@ def test_the_restitution_is_drawn_with_the_effect_of_noise(table, tmp_path, caps
     low, high = np.array(values['noise_and_gas_95'])
     assert np.mean((paper > low) & (paper < high)) > 0.85
     assert len(values['local_speed']) == 8
-    assert {(0x22, 0x3B, 0xC2), (0x6F, 0x50, 0x30)} <= colours(tmp_path / 'a.png')
+    assert {bgr(FITTED), bgr(MEASURED)} <= colours(tmp_path / 'a.png')
 
 
 def test_a_folder_of_results_is_accepted(table, tmp_path, capsys):
@@ -116,5 +121,5 @@ def test_a_tray_too_dense_for_the_theory_names_the_alternative(tmp_path, capsys)
         'trays: {1: {dimensions_mm: [15, 15, 3], '
         'species: [{material: acrylic, diameter_mm: 2, count: 60}]}}\n'
     )
-    assert draw('instantaneous', table, tmp_path / 'a.png', '--trays', str(trays)) == 2
+    assert draw('instantaneous', table, tmp_path / 'a.png', '--trays-file', str(trays)) == 2
     assert 'use the decay library' in capsys.readouterr().err

@@ -54,7 +54,7 @@ def test_elastic_particles_never_collapse(tmp_path, capsys):
         (('--measured', '9:0.01'), 'tray 9'),
         (('--no-paper',), 'there are none'),
         (('--restitution', '2'), 'from 0 to 1'),
-        (('--trays', 'nowhere.yaml'), 'nowhere.yaml'),
+        (('--trays-file', 'nowhere.yaml'), 'nowhere.yaml'),
     ],
 )
 def test_a_wrong_call_is_named_in_one_line(tmp_path, monkeypatch, capsys, more, text):

@@ -47,7 +47,7 @@ def test_measured_level_areas_give_the_compaction_of_the_paper(results, tmp_path
         ((), 2, 'neither is given'),
         (('nowhere', '--simulate'), 2, 'both are given'),
         (('nowhere',), 1, 'is no folder'),
-        (('--simulate', '--trays', '1,x'), 2, '1,3,5'),
+        (('--simulate', '--trays', '1,x'), 2, "'x' is no number of a tray"),
         (('--simulate', '--trays', '12'), 2, 'tray 12'),
         (('--simulate', '--cycles', '0'), 1, '1 or more'),
         (('--simulate', '--sticking-speed', '-1'), 2, 'sticking_speed'),

@@ -62,12 +62,12 @@ def test_a_sweep_prints_curves_and_writes_them(tmp_path, capsys):
         lines = list(csv.DictReader(stream))
     assert len(lines) == 3 * 2 * 3
     assert list(lines[0])[:4] == [
-        'restitution [1]',
-        'wall_restitution [1]',
-        'time [s]',
-        'mean_speed [m/s]',
+        'restitution',
+        'wall_restitution',
+        'time',
+        'mean_speed',
     ]
-    assert float(lines[-1]['mean_projected_speed [m/s]']) == sweep.mean_projected_speed[2, 1, 2]
+    assert float(lines[-1]['mean_projected_speed']) == sweep.mean_projected_speed[2, 1, 2]
 
 
 def test_drag_is_an_axis_and_slows_the_gas(tmp_path, capsys):

@@ -156,7 +156,7 @@ def with_fewer_beads():
 def test_another_tray_has_no_curve_and_the_error_names_the_command():
     tray = with_fewer_beads()
     with pytest.raises(
-        ConfigurationError, match=r'nanorocks cluster-curve --tray 3 -o curve\.npz'
+        ConfigurationError, match=r'nanorocks cluster-curve --trays 3 -o curve\.npz'
     ):
         curve_of(tray)
 

@@ -29,7 +29,7 @@ from nanorocks_ros.recordings.messages.image_messages import (
 )
 from nanorocks_ros.records import Merge
 from nanorocks_ros.wire import topics
-from nanorocks_ros.wire.array_layouts import from_array, layout
+from nanorocks_ros.wire.array_layouts import layout, to_array
 
 STAMP_NS = 1_700_000_000_123_456_789
 
@@ -68,10 +68,15 @@ def test_a_jpeg_is_decoded_again():
 
 
 def test_a_record_survives_as_array():
-    values = np.arange(1, 1 + len(layout(Merge).fields), dtype=np.float32)
-    # Whether the beads stick.
-    values[-1] = 1.0
-    merge = from_array(Merge, values, tray=2, epoch_ns=STAMP_NS, where='test')
+    merge = Merge(
+        stamp_ns=STAMP_NS + 10**9,
+        known_ns=STAMP_NS + 2 * 10**9,
+        tray=2,
+        cycle=3,
+        tracks=np.array([4, 5], dtype=np.int32),
+        joins=True,
+    )
+    values = to_array(merge, STAMP_NS)
     message = transported(array_message(merge, STAMP_NS))
     assert message.layout.dim[0].label == layout(Merge).label
     assert message.layout.dim[0].size == len(values)

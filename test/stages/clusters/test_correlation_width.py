@@ -136,7 +136,7 @@ def test_a_tray_without_calibration_says_once_which_command_makes_it():
     assert estimate.size_status is SizeStatus.UNCALIBRATED
     assert math.isnan(estimate.cluster_size.value)
     assert estimate.level_area > 0.0
-    assert 'nanorocks cluster-curve --tray 1 -o curve.npz' in notice.text
+    assert 'nanorocks cluster-curve --trays 1 -o curve.npz' in notice.text
     (again,) = pushed(stage, bead_image(7), NS)
     assert again.size_status is SizeStatus.UNCALIBRATED
 

@@ -67,6 +67,24 @@ def simulated_cycle(cycle=1, start=0.0, restitution=0.89, wall=0.97):
     return [speed(start + t, v, cycle, start) for t, v in zip(times, values, strict=True)]
 
 
+def is_inside(final):
+    """Whether the interval of 68 % holds the value, and lies in that of 95 %."""
+    outer = final.restitution
+    inner = outer.lower, final.restitution_lower_68, outer.value
+    return sorted(inner) == list(inner) and outer.value < final.restitution_upper_68 < outer.upper
+
+
+def test_a_library_gives_an_interval_of_68_percent_inside_the_other():
+    *_, final = all_estimates(fitter(), simulated_cycle())
+    assert is_inside(final)
+    walls = final.wall_restitution
+    assert walls.lower < final.wall_restitution_lower_68 < walls.value
+    assert walls.value < final.wall_restitution_upper_68 < walls.upper
+    narrow = all_estimates(fitter(**{'cooling.probability': 0.6827}), simulated_cycle())[-1]
+    assert narrow.restitution.lower == pytest.approx(final.restitution_lower_68, abs=1e-12)
+    assert narrow.restitution.upper == pytest.approx(final.restitution_upper_68, abs=1e-12)
+
+
 def test_a_decay_is_read_by_the_closed_form_of_the_paper_when_that_is_asked_for():
     *_, final = all_estimates(fitter(**{'cooling.relation': 'paper'}), cooling_cycle())
     expected = paper_restitution_of_decay(1 / (6e-3 * 5.0), TRAY.diameter, TRAY.number_density)
@@ -74,6 +92,7 @@ def test_a_decay_is_read_by_the_closed_form_of_the_paper_when_that_is_asked_for(
     assert final.relation is CorRelation.PAPER
     assert final.restitution.lower < expected < final.restitution.upper
     assert final.paper_restitution == final.restitution.value
+    assert is_inside(final)
     assert final.initial_speed.value == pytest.approx(6e-3, rel=0.02)
     assert final.haff_time.value == pytest.approx(5.0, rel=0.04)
 

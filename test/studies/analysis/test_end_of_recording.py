@@ -81,7 +81,7 @@ def test_bodies_are_counted_up_to_the_end(analysis):
 def test_the_tables_and_the_results_bag_hold_the_last_second(analysis, film, tmp_path, table):
     write_results(analysis, tmp_path / 'results', film, SETTINGS)
     with (tmp_path / 'results' / f'tray_1_{table}.csv').open(newline='') as stream:
-        times = [float(row['time [s]']) for row in csv.DictReader(stream)]
+        times = [float(row['time']) for row in csv.DictReader(stream)]
     assert max(times) > FRAMES / RATE - 0.5
     bag = open_bag(tmp_path / 'results' / BAG_NAME)
     (topic,) = (name for name in bag.topics if name.endswith(f'/{table}'))

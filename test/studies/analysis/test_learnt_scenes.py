@@ -72,7 +72,6 @@ def test_balls_struck_from_rest_keep_their_numbers(struck, tmp_path, capsys):
     assert tray['species'][0]['tracks'] == STRUCK.count
     assert tray['recognition'][0]['usable']
     with table.open(encoding='utf-8') as stream:
-        stream.readline()
         rows = list(csv.DictReader(stream))
     beads = {}
     for row in rows:

@@ -103,7 +103,7 @@ def test_results_are_written_as_tables_and_as_a_bag(analysis, tmp_path):
     with (folder / 'tray_1_speed.csv').open(encoding='utf-8') as file:
         rows = list(csv.reader(file))
     fields = layout(SpeedEstimate).fields
-    assert rows[0] == [f'{field.name} [{field.unit}]' for field in fields]
+    assert rows[0] == [field.name for field in fields]
     assert len(rows) - 1 == len(analysis.trays[1].speeds)
     bag = open_bag(folder / BAG_NAME)
     cors = [

@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nanorocks_ros.outputs.csv_tables import number
+from nanorocks_ros.outputs.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.records import (
     CorEstimate,
@@ -23,6 +25,7 @@ from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
 from nanorocks_ros.studies.analysis.results_folder import FORMATS, write_results
 from nanorocks_ros.studies.analysis.results_json import as_json, last_of_each_cycle
+from nanorocks_ros.studies.results.record_columns import columns_of
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array, layout
 from nanorocks_ros.wire.products import MEASURED
@@ -67,8 +70,8 @@ def test_the_decay_of_each_species_is_in_the_table(tmp_path):
     write_results(analysis(), tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     with (tmp_path / 'results' / 'tray_5_cor.csv').open(newline='') as stream:
         (row,) = csv.DictReader(stream)
-    assert float(row['first_species_haff_time [s]']) == 2.5
-    assert row['second_species_haff_time [s]'] == 'nan'
+    assert float(row['first_species_haff_time']) == 2.5
+    assert row['second_species_haff_time'] == ''
 
 
 def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
@@ -84,20 +87,55 @@ def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
     table = parquet.read_table(tmp_path / 'parquet' / 'tray_5_cor.parquet')
     with (tmp_path / 'csv' / 'tray_5_cor.csv').open(newline='') as stream:
         (row,) = csv.DictReader(stream)
-    for field in table.schema:
-        unit = field.metadata[b'unit'].decode()
-        np.testing.assert_equal(table[field.name][0].as_py(), float(row[f'{field.name} [{unit}]']))
+    assert table.schema.names == list(row)
+    for column in columns_of(CorEstimate):
+        stored = table.schema.field(column.name).metadata[b'unit'].decode()
+        value = table[column.name][0].as_py()
+        assert stored == column.unit
+        if column.kind == 'string':
+            assert value == row[column.name]
+        else:
+            np.testing.assert_equal(value, number(row[column.name]))
     assert json.loads(table.schema.metadata[b'provenance'])['source'] == 'bag'
 
 
-def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
+def full_analysis():
+    """With a record of every kind."""
     analysed = analysis()
     for product in MEASURED:
         if not analysed.trays[5].of(product.record):
-            values = np.ones(len(layout(product.record).fields))
+            values = np.ones(len(layout(product.record).elements))
             analysed.trays[5].add(
                 from_array(product.record, values, tray=5, epoch_ns=0, where='test')
             )
+    return analysed
+
+
+def test_every_table_has_the_columns_and_types_of_its_description_in_pandas(tmp_path):
+    pandas = pytest.importorskip('pandas')
+    write_results(full_analysis(), tmp_path / 'out', tmp_path / 'bag', PipelineSettings())
+    package = json.loads((tmp_path / 'out' / PACKAGE).read_text())
+    tables = {path.name for path in (tmp_path / 'out').glob('*.csv')}
+    assert {resource['path'] for resource in package['resources']} == tables
+    checks = {
+        'number': pandas.api.types.is_float_dtype,
+        'integer': pandas.api.types.is_integer_dtype,
+        'boolean': pandas.api.types.is_bool_dtype,
+        'string': pandas.api.types.is_string_dtype,
+    }
+    for resource in package['resources']:
+        frame = pandas.read_csv(tmp_path / 'out' / resource['path'])
+        fields = resource['schema']['fields']
+        assert list(frame.columns) == [field['name'] for field in fields]
+        for field in fields:
+            column = frame[field['name']]
+            assert checks[field['type']](column) or column.isna().all(), field
+            words = field.get('constraints', {}).get('enum')
+            assert words is None or set(column) <= set(words)
+
+
+def test_every_kind_of_result_goes_into_the_bag_and_into_the_tables(tmp_path):
+    analysed = full_analysis()
     write_results(analysed, tmp_path / 'results', tmp_path / 'bag', PipelineSettings())
     bag = open_bag(tmp_path / 'results' / 'results_bag')
     assert bag.complete

@@ -143,7 +143,7 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
     # One filmed at a wrong scale, of which no size is known, costs the others none of theirs.
     wrong = copy.deepcopy(batch[0].summary)
     for cycle in wrong['trays']['1']['cycles']:
-        cycle['quality'] |= Quality.WRONG_SCALE
+        cycle['quality'] += Quality.WRONG_SCALE.names()
     sizes = wrong['trays']['1']['by_cycle']
     wrong['trays']['1']['by_cycle'] = {'correlation_length': sizes['correlation_length']}
     with_wrong_scale = combined([*batch, replace(batch[0], summary=wrong)], PipelineSettings())

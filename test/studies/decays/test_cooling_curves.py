@@ -11,6 +11,7 @@ from decays import simulated_table, write_rows
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.records import (
     NS,
     Measured,
@@ -96,7 +97,7 @@ def test_a_folder_without_speeds_is_named(tmp_path):
 def test_a_decay_is_read_from_a_table_of_cycles_or_of_one_curve(tmp_path):
     cycles = write_rows(tmp_path / 'tray_1_speed.csv', cycle(1, 3.0) + cycle(2, 63.0))
     names = ('time', 'mean_projected_speed')
-    write_csv(tmp_path / 'curve.csv', names, ('s', 'm/s'), LAW)
+    write_csv(tmp_path / 'curve.csv', float_columns(names, ('s', 'm/s')), LAW)
     from_cycles, from_curve = read_decay(cycles), read_decay(tmp_path / 'curve.csv')
     assert (from_cycles.cycles, from_curve.cycles) == (2, None)
     assert read_decay(tmp_path / 'tray_1_speed.csv').speed == pytest.approx(from_curve.speed)

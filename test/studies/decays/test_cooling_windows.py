@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.studies.decays.cooling_windows import CoolingWindow, cooling_window
 
 FIELDS = ('status', 'window_start', 'window_end', 'cooling_start')
@@ -12,7 +13,7 @@ FINAL, COOLING, NO_DECAY = 2, 1, 3
 
 
 def write(folder, rows, fields=FIELDS):
-    write_csv(folder / 'tray_3_cor.csv', fields, ['s'] * len(fields), rows)
+    write_csv(folder / 'tray_3_cor.csv', float_columns(fields, ['s'] * len(fields)), rows)
     return folder / 'tray_3_speed.csv'
 
 

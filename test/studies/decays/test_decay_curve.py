@@ -9,6 +9,7 @@ import pytest
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, curve_at, read_curve
@@ -35,7 +36,9 @@ def point():
 
 
 def table(path, columns, fields=FIELDS):
-    write_csv(path, fields, ['s', 'm/s', 'm/s'][: len(fields)], zip(*columns, strict=True))
+    write_csv(
+        path, float_columns(fields, ['s', 'm/s', 'm/s'][: len(fields)]), zip(*columns, strict=True)
+    )
     return path
 
 

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from nanorocks_ros.cli.main import main
+from nanorocks_ros.outputs.table_files import PACKAGE
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.gas_statistics.statistics_files import TABLES
 from nanorocks_ros.studies.synthetic.film_bag import film_into_bag
@@ -27,7 +28,9 @@ def test_the_command_prints_and_writes(bag, tmp_path, capsys):
     assert 'acrylic: a2 ' in printed.out
     assert 'mean free path' in printed.out
     assert str(folder) in printed.err
-    assert sorted(path.name for path in folder.iterdir()) == sorted([*TABLES, 'tray_1.png'])
+    assert sorted(path.name for path in folder.iterdir()) == sorted(
+        [*TABLES, 'tray_1.png', PACKAGE]
+    )
 
 
 def test_json_is_one_object_with_errors(bag, capsys):

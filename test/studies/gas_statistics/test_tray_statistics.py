@@ -12,6 +12,7 @@ from gas_tracks import tracked_gas, with_beads_lost
 
 from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.outputs.csv_tables import read_csv
+from nanorocks_ros.outputs.table_files import PACKAGE
 from nanorocks_ros.studies.gas_statistics.statistics_figure import statistics_figure
 from nanorocks_ros.studies.gas_statistics.statistics_files import (
     TABLES,
@@ -62,7 +63,7 @@ def test_lost_beads_leave_pairs_and_structure(statistics):
 
 def test_tables_hold_the_numbers(statistics, tmp_path):
     write_tables(tmp_path, {3: statistics})
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(TABLES)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*TABLES, PACKAGE])
     names, rows = read_csv(tmp_path / 'energies.csv')
     column = names.index('energy')
     part = statistics.temperatures[0]

@@ -109,9 +109,9 @@ def test_the_command_writes_figure_and_table_and_prints_the_sizes(bag, tmp_path,
     assert cv2.imread(str(picture)).shape[1] > 1000
     with table.open(newline='') as stream:
         rows = list(csv.DictReader(stream))
-    assert {row['tray [1]'] for row in rows} == {'1', '6'}
+    assert {row['tray'] for row in rows} == {'1', '6'}
     assert len(rows) == printed['trays']['1']['pictures'] + printed['trays']['6']['pictures']
-    assert float(rows[0]['level_area [m^2]']) > 0.0
+    assert float(rows[0]['level_area']) > 0.0
     assert main(arguments) == 1
     assert 'add --force' in capsys.readouterr().err
 

@@ -8,6 +8,7 @@ import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.csv_tables import write_csv
+from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.studies.reproduction.campaign_cycle import RESULTS, CycleFiles
 from nanorocks_ros.studies.reproduction.chapters.cluster_chapter import tracked_end
 
@@ -23,7 +24,7 @@ def cycle_with(folder, last):
     names = (*COLUMNS, *ERRORS)
     row = (last, 2.0, 0.8, 22.0, 0.1, 0.01)
     units = ('s', *['1'] * (len(names) - 1))
-    write_csv(results / f'tray_{TRAY.number}_bodies.csv', names, units, [row])
+    write_csv(results / f'tray_{TRAY.number}_bodies.csv', float_columns(names, units), [row])
     truth = {str(TRAY.number): {'time': [0.0, 33.8]}}
     return CycleFiles(folder=folder, kind='sticking', summary={'truth': truth})
 

@@ -15,7 +15,8 @@ from nanorocks_ros.studies.synthetic.simulated_figure import simulated_figure
 from nanorocks_ros.studies.synthetic.simulated_plan import SimulationPlan
 from nanorocks_ros.studies.synthetic.simulated_runs import simulate
 
-MEAN, MARK = (0x22, 0x3B, 0xC2), (0x6F, 0x50, 0x30)
+# In blue, green, red.
+MEAN, MARK = (0x00, 0x5E, 0xD5), (0, 0, 0)
 
 
 def drawn(path, tray=1, samples=51, runs=3, **settings):

@@ -9,12 +9,12 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from nanorocks_ros.experiment.paper_values import PAPER_CLUSTER_PEAK
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import MAP, TWO_COLUMNS, scale_bar
 from nanorocks_ros.outputs.html_report import (
     Erratum,
     Picture,
@@ -271,26 +271,26 @@ def _draw_autocorrelation(context: Context, path: Path) -> None:
             if early is None and age > 0.5:
                 early = image.gray
             late = image.gray
-    figure = Figure(figsize=(9.0, 6.2), layout='constrained')
-    axes: Any = figure.subplots(2, 2)
-    names = ('0.5 s after the shaking event', 'at the end of the cycle')
-    for row, (gray, name) in enumerate(zip((early, late), names, strict=True)):
-        if gray is None:
-            continue
-        axes[row, 0].imshow(gray, cmap='gray')
-        axes[row, 0].set_title(name, fontsize=10)
-        correlation = correlated(gray, scale)
-        half = min(correlation.values.shape) // 4
-        middle = [size // 2 for size in correlation.values.shape]
-        near = correlation.values[
-            middle[0] - half : middle[0] + half, middle[1] - half : middle[1] + half
-        ]
-        side = _MM * correlation.side * half
-        extent = (-side, side, side, -side)
-        axes[row, 1].imshow(near, cmap='viridis', vmin=0.0, vmax=1.0, extent=extent)
-        axes[row, 1].contour(near, levels=(0.3, 0.5, 0.7), colors='w', linewidths=1,
-                             extent=(-side, side, -side, side))  # fmt: skip
-        axes[row, 1].set_title('autocorrelation; shifts in mm', fontsize=10)
-        axes[row, 0].set_axis_off()
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 120.0) as figure:
+        axes: Any = figure.subplots(2, 2)
+        names = ('0.5 s after the shaking event', 'at the end of the cycle')
+        for row, (gray, name) in enumerate(zip((early, late), names, strict=True)):
+            if gray is None:
+                continue
+            axes[row, 0].imshow(gray, cmap='gray')
+            scale_bar(axes[row, 0], scale / _MM)
+            axes[row, 0].set_title(name)
+            correlation = correlated(gray, scale)
+            half = min(correlation.values.shape) // 4
+            middle = [size // 2 for size in correlation.values.shape]
+            near = correlation.values[
+                middle[0] - half : middle[0] + half, middle[1] - half : middle[1] + half
+            ]
+            side = _MM * correlation.side * half
+            extent = (-side, side, side, -side)
+            axes[row, 1].imshow(near, cmap=MAP, vmin=0.0, vmax=1.0, extent=extent)
+            axes[row, 1].contour(near, levels=(0.3, 0.5, 0.7), colors='w', linewidths=1,
+                                 extent=(-side, side, -side, side))  # fmt: skip
+            axes[row, 1].set(title='autocorrelation', ylabel='shift in y [mm]')
+            axes[row, 0].set_axis_off()
+        axes[1, 1].set_xlabel('shift in x [mm]')

@@ -20,7 +20,12 @@ from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 from nanorocks_ros.studies.inspection.steps_figure import steps_figure
-from nanorocks_ros.studies.inspection.track_overlay import overlay
+from nanorocks_ros.studies.inspection.track_overlay import (
+    MAGNIFICATION,
+    overlay,
+    with_scale_bar,
+    write_overlay,
+)
 from nanorocks_ros.studies.reproduction.campaign_plan import STICKING, plate_settings
 from nanorocks_ros.studies.reproduction.chapters.chapter_context import Chapter, Difference
 
@@ -178,6 +183,4 @@ def _draw_tracks(context: Context, path: Path) -> None:
         progress=lambda done, total: context.progress(0.5 + 0.5 * done / max(total, 1)),
     )
     picture = overlay(bag.pictures[1], bag.tracks[1], bag.pixels_per_metre, path_frames=600)
-    _, content = cv2.imencode('.png', picture)
-    with atomic_file(path) as part:
-        part.write_bytes(content.tobytes())
+    write_overlay(path, [with_scale_bar(picture, MAGNIFICATION * bag.pixels_per_metre)])

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import BLACK, FITTED, PURPLE, SKY, TWO_COLUMNS
 from nanorocks_ros.outputs.html_report import Picture, Section, Table, number
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.decays.cooling_curves import mean_cycle, read_cycles, speed_table
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _TRAY = 1
 _DURATION, _SAMPLES = 30.0, 301
 _MM = 1e3
-_RUN, _MEAN, _MEASURED, _CHI = '0.75', '#c23b22', '#1b7837', '#2166ac'
+_RUN, _MEAN, _MEASURED, _CHI = SKY, FITTED, BLACK, PURPLE
 
 
 class SimulatedDecay(NamedTuple):
@@ -154,27 +154,27 @@ def decay_deviation(runs: SimulatedRuns, measured: SpeedCurve) -> NDArray[np.flo
 
 def _draw(path: Path, decay: SimulatedDecay, measured: SpeedCurve) -> None:
     times = decay.runs.plan.times
-    figure = Figure(figsize=(9.0, 5.6), layout='constrained')
-    axes: Any
-    axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    curves = [np.column_stack((times, _MM * run.mean_projected_speed)) for run in decay.runs.runs]
-    axes.add_collection(
-        LineCollection(curves, colors=_RUN, linewidths=0.5, label=f'{len(curves)} runs')
-    )
-    mean = decay.runs.mean('mean_projected_speed')
-    axes.plot(times, _MM * mean, color=_MEAN, lw=2, label='their mean')
-    low, high = (_MM * (measured.speed + sign * measured.error) for sign in (-1.0, 1.0))
-    axes.fill_between(measured.times, low, high, color=_MEASURED, alpha=0.25, lw=0)
-    axes.plot(measured.times, _MM * measured.speed, color=_MEASURED, lw=1.5,
-              label='measured on our films')  # fmt: skip
-    axes.set(xlim=(0.0, times[-1]), ylim=(0.0, None), ylabel='mean projected speed [mm/s]')
-    beads, walls = decay.restitutions
-    axes.set_title(f'tray {_TRAY}, beads {beads:g}, walls {walls:g}', loc='left', fontsize=10)
-    axes.legend(frameon=False)
-    below.plot(measured.times, decay.deviation[0], color=_CHI, lw=1.2)
-    below.axhline(1.0, color='0.5', lw=1)
-    below.set(xlabel='time since the shaking event [s]', ylabel='chi square', ylim=(0.0, None))
-    for panel in (axes, below):
-        panel.grid(alpha=0.25)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 115.0) as figure:
+        axes: Any
+        axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        curves = [
+            np.column_stack((times, _MM * run.mean_projected_speed)) for run in decay.runs.runs
+        ]
+        axes.add_collection(
+            LineCollection(curves, colors=_RUN, linewidths=0.5, label=f'{len(curves)} runs')
+        )
+        mean = decay.runs.mean('mean_projected_speed')
+        axes.plot(times, _MM * mean, color=_MEAN, lw=2, label='their mean')
+        low, high = (_MM * (measured.speed + sign * measured.error) for sign in (-1.0, 1.0))
+        axes.fill_between(measured.times, low, high, color=_MEASURED, alpha=0.25, lw=0)
+        axes.plot(measured.times, _MM * measured.speed, color=_MEASURED, lw=1.5,
+                  label='measured on our films')  # fmt: skip
+        axes.set(xlim=(0.0, times[-1]), ylim=(0.0, None), ylabel='mean projected speed [mm/s]')
+        beads, walls = decay.restitutions
+        axes.set_title(f'tray {_TRAY}, beads {beads:g}, walls {walls:g}')
+        axes.legend()
+        below.plot(measured.times, decay.deviation[0], color=_CHI, lw=1.2)
+        below.axhline(1.0, color='0.5', lw=1)
+        below.set(xlabel='time since the shaking event [s]', ylabel='chi square', ylim=(0.0, None))
+        for panel in (axes, below):
+            panel.grid(alpha=0.25)

@@ -9,14 +9,20 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.paper_values import PAPER_PEAK_SPEED
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import (
+    GREEN,
+    MEASURED,
+    PAPER,
+    TRUTH,
+    TWO_COLUMNS,
+    plain_numbers,
+)
 from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table
 from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 from nanorocks_ros.studies.inspection.speeds_figure import speeds_figure
@@ -42,8 +48,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.reproduction.chapters.chapter_context import Context
 
 _MM = 1e3
-_SHOWN = (('tracking', '#30506f', 'o'), ('structure_function', '#2a9d8f', 's'),
-          ('binarised_area', '#c23b22', '^'))  # fmt: skip
+_SHOWN = (('tracking', MEASURED, 'o'), ('structure_function', GREEN, 's'),
+          ('binarised_area', PAPER, '^'))  # fmt: skip
 _NAMES = {
     'tracking': 'tracking',
     'structure_function': 'structure function',
@@ -155,42 +161,38 @@ def _peak(cycle: CycleFiles, tray: int, source: str) -> float:
 
 
 def _draw_ratios(path: Path, tray_speeds: ComparedSpeeds, cycle: int) -> None:
-    figure = Figure(figsize=(8.0, 4.5), layout='constrained')
-    axes = figure.subplots()
-    for method, colour, marker in _SHOWN:
-        speeds = [speed for speed in tray_speeds.speeds[method] if speed.cycle == cycle]
-        if not speeds:
-            continue
-        true = tray_speeds.true_speeds(speeds)
-        ratio = np.array([speed.mean_projected_speed.value for speed in speeds]) / true
-        axes.plot(_MM * true, ratio, marker, color=colour, ms=3, alpha=0.6, label=_NAMES[method])
-    axes.axhline(1.0, color='0.5', lw=1)
-    axes.set(xscale='log', yscale='log', xlabel='true mean projected speed [mm/s]',
-             ylabel='measured / true')  # fmt: skip
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter('{x:g}')
-        axis.set_minor_formatter(NullFormatter())
-    axes.grid(alpha=0.25)
-    axes.legend(frameon=False)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 100.0) as figure:
+        axes = figure.subplots()
+        for method, colour, marker in _SHOWN:
+            speeds = [speed for speed in tray_speeds.speeds[method] if speed.cycle == cycle]
+            if not speeds:
+                continue
+            true = tray_speeds.true_speeds(speeds)
+            ratio = np.array([speed.mean_projected_speed.value for speed in speeds]) / true
+            axes.plot(
+                _MM * true, ratio, marker, color=colour, ms=3, alpha=0.6, label=_NAMES[method]
+            )
+        axes.axhline(1.0, color='0.5', lw=1)
+        axes.set(xscale='log', yscale='log', xlabel='true mean projected speed [mm/s]',
+                 ylabel='measured / true')  # fmt: skip
+        for axis in (axes.xaxis, axes.yaxis):
+            plain_numbers(axis)
+        axes.grid(alpha=0.25)
+        axes.legend()
 
 
 def _draw_peaks(path: Path, peaks: dict[int, tuple[float, ...]]) -> None:
-    figure = Figure(figsize=(8.0, 4.0), layout='constrained')
-    axes: Any = figure.subplots()
-    trays = np.array(list(peaks))
-    values = _MM * np.array(list(peaks.values()), dtype=np.float64)
-    for column, (name, colour, marker, shift) in enumerate(
-        (('ours', '#30506f', 'o', -0.12), ("the paper's area, calibrated", '#c23b22', '^', 0.12),
-         ('truth', '0.4', '_', 0.0))
-    ):  # fmt: skip
-        size = 16 if marker == '_' else 6
-        axes.plot(trays + shift, values[:, column], marker, color=colour, ms=size, label=name)
-    axes.plot([1], [_MM * PAPER_PEAK_SPEED], 'k*', ms=9, label='the paper, tray 1')
-    axes.set(xlabel='tray', ylabel='peak speed [mm/s]', ylim=(0.0, None))
-    axes.grid(alpha=0.25)
-    axes.legend(frameon=False)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 90.0) as figure:
+        axes: Any = figure.subplots()
+        trays = np.array(list(peaks))
+        values = _MM * np.array(list(peaks.values()), dtype=np.float64)
+        for column, (name, colour, marker, shift) in enumerate(
+            (('ours', MEASURED, 'o', -0.12), ("the paper's area, calibrated", PAPER, '^', 0.12),
+             ('truth', TRUTH, '_', 0.0))
+        ):  # fmt: skip
+            size = 16 if marker == '_' else 6
+            axes.plot(trays + shift, values[:, column], marker, color=colour, ms=size, label=name)
+        axes.plot([1], [_MM * PAPER_PEAK_SPEED], 'k*', ms=9, label='the paper, tray 1')
+        axes.set(xlabel='tray', ylabel='peak speed [mm/s]', ylim=(0.0, None))
+        axes.grid(alpha=0.25)
+        axes.legend()

@@ -8,12 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import GREEN, TRUTH, TWO_COLUMNS, VERMILION
 from nanorocks_ros.physics.moving_area import moving_area
 from nanorocks_ros.studies.reproduction.campaign_plan import FIRST_SHAKE
 from nanorocks_ros.studies.reproduction.marked_calibration import (
@@ -33,18 +33,16 @@ _MM = 1e3
 _TRAY = 3
 # Displacement in the schematic, in radii.
 _SHIFT = 0.7
-_AREA, _BY_HAND, _TRUTH = '#c23b22', '#1b7837', '0.5'
+_AREA, _BY_HAND = VERMILION, GREEN
 
 
 def area_figure(path: Path, cycle: CycleFiles) -> None:
     """Draw the moving area and the speeds of a cycle by it."""
-    figure = Figure(figsize=(11.0, 3.6), layout='constrained')
-    schematic, areas, speeds = figure.subplots(1, 3, width_ratios=(1, 1.2, 2))
-    _draw_schematic(schematic)
-    _draw_areas(areas)
-    _draw_speeds(speeds, cycle)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 60.0) as figure:
+        schematic, areas, speeds = figure.subplots(1, 3, width_ratios=(1, 1.2, 2))
+        _draw_schematic(schematic)
+        _draw_areas(areas)
+        _draw_speeds(speeds, cycle)
 
 
 def _draw_schematic(axes: Axes) -> None:
@@ -55,14 +53,14 @@ def _draw_schematic(axes: Axes) -> None:
     axes.contourf(x, y, moving, levels=(0.5, 1.5), hatches=['////'], colors=['#f3d9d5'])
     for centre, style, time in ((0.0, '--', 't'), (_SHIFT, '-', 't + dt')):
         axes.add_patch(Circle((centre, 0.0), 1.0, fill=False, ls=style, lw=1.4))
-        axes.annotate(time, (centre, 1.08), ha='center', fontsize=9)
+        axes.annotate(time, (centre, 1.08), ha='center')
     axes.annotate('', (_SHIFT, 0.0), (0.0, 0.0), arrowprops={'arrowstyle': '<->'})
-    axes.annotate('dx', (0.5 * _SHIFT, 0.1), ha='center', fontsize=9)
+    axes.annotate('dx', (0.5 * _SHIFT, 0.1), ha='center')
     axes.annotate('', (0.0, -1.0), (0.0, 0.0), arrowprops={'arrowstyle': '<->'})
-    axes.annotate('R', (0.06, -0.6), fontsize=9)
+    axes.annotate('R', (0.06, -0.6))
     axes.set_aspect('equal')
     axes.set_axis_off()
-    axes.set_title('a', loc='left', fontsize=10)
+    axes.set_title('a')
 
 
 def _draw_areas(axes: Axes) -> None:
@@ -71,7 +69,7 @@ def _draw_areas(axes: Axes) -> None:
     axes.plot(shift, 4.0 * shift, '--', color='0.3', label='4 R dx, used by the paper')
     axes.set(xlabel='dx / R', ylabel='moving area / R²', ylim=(0.0, 9.0))
     axes.grid(alpha=0.25)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
 
 
 def _draw_speeds(axes: Any, cycle: CycleFiles) -> None:
@@ -84,7 +82,7 @@ def _draw_speeds(axes: Any, cycle: CycleFiles) -> None:
     times = np.array(results['time']) - FIRST_SHAKE
     after = times > 0.0
     axes.plot(times[after], _MM * np.array(results['mean_projected_speed'])[after], lw=4,
-              alpha=0.5, color=_TRUTH, label='all beads')  # fmt: skip
+              alpha=0.5, color=TRUTH, label='all beads')  # fmt: skip
     series = area_series(cycle, _TRAY)
     axes.plot(series.times, _MM * series.speed, ':', color=_AREA, lw=1,
               label='area, not calibrated')  # fmt: skip
@@ -95,6 +93,6 @@ def _draw_speeds(axes: Any, cycle: CycleFiles) -> None:
         axes.text(0.5, 0.5, f'no calibration: {error.what}', transform=axes.transAxes, wrap=True)
     axes.set(xlabel='time since the shaking event [s]', ylabel='mean projected speed [mm/s]',
              ylim=(0.0, None))  # fmt: skip
-    axes.set_title(f'b: tray {_TRAY}', loc='left', fontsize=10)
+    axes.set_title(f'b: tray {_TRAY}')
     axes.grid(alpha=0.25)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()

@@ -9,9 +9,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import MEASURED, PAPER, TRUTH, TWO_COLUMNS
 from nanorocks_ros.physics.paper_clusters import paper_calibration
 from nanorocks_ros.studies.analysis.result_tables import read_columns
 from nanorocks_ros.studies.reproduction.campaign_plan import FIRST_SHAKE
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 # The end of a cycle, and the time over which the curve of the derivative is averaged, [s].
 _END, _SMOOTHED = 2.0, 1.0
-_PAPER, _OURS, _TRUTH = '#c23b22', '#30506f', '0.45'
 
 
 def growth_figure(path: Path, cycles: Sequence[CycleFiles], tray: int) -> None:
@@ -39,32 +38,34 @@ def growth_figure(path: Path, cycles: Sequence[CycleFiles], tray: int) -> None:
     after = table['time'] > FIRST_SHAKE
     times = table['time'][after] - FIRST_SHAKE
     size = table['level_area'][after] * _beads_per_area(cycles, tray)
-    figure = Figure(figsize=(9.0, 5.4), layout='constrained')
-    axes: Any
-    axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    axes.plot(times, size, color=_PAPER, lw=1.2, label='the rule of the paper')
-    combined = table['combined_size'][after]
-    error = table['combined_size_error'][after]
-    axes.plot(times, combined, color=_OURS, lw=1.2, label='ours, averaged over beads')
-    axes.fill_between(times, combined - error, combined + error, color=_OURS, alpha=0.2, lw=0)
-    truth = {name: np.array(values) for name, values in cycle.summary['truth'][str(tray)].items()}
-    true_times = truth['time'] - FIRST_SHAKE
-    late = true_times > 0.0
-    clusters = np.where(truth['clusters'] > 0.0, truth['clusters'], np.nan)
-    per_cluster = truth['beads_in_clusters'] / clusters
-    axes.plot(true_times[late], truth['weighted_size'][late], color=_TRUTH, lw=3, alpha=0.6,
-              label='truth, averaged over beads')  # fmt: skip
-    axes.plot(true_times[late], per_cluster[late], '--', color=_TRUTH, lw=1.5,
-              label='truth, beads per cluster')  # fmt: skip
-    axes.set(ylabel='cluster size [beads]', ylim=(0.0, None))
-    axes.legend(frameon=False, fontsize=8)
-    below.plot(times, np.gradient(_running_mean(times, size), times), color=_PAPER, lw=1.2)
-    below.axhline(0.0, color='0.5', lw=1)
-    below.set(xlabel='time since the shaking event [s]', ylabel='dn/dt [1/s]')
-    for panel in (axes, below):
-        panel.grid(alpha=0.25)
-    with atomic_file(path) as part:
-        figure.savefig(part, dpi=110)
+    with figure_file(path, TWO_COLUMNS, 110.0) as figure:
+        axes: Any
+        axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        axes.plot(times, size, color=PAPER, lw=1.2, label='the rule of the paper')
+        combined = table['combined_size'][after]
+        error = table['combined_size_error'][after]
+        axes.plot(times, combined, color=MEASURED, lw=1.2, label='ours, averaged over beads')
+        axes.fill_between(
+            times, combined - error, combined + error, color=MEASURED, alpha=0.2, lw=0
+        )
+        truth = {
+            name: np.array(values) for name, values in cycle.summary['truth'][str(tray)].items()
+        }
+        true_times = truth['time'] - FIRST_SHAKE
+        late = true_times > 0.0
+        clusters = np.where(truth['clusters'] > 0.0, truth['clusters'], np.nan)
+        per_cluster = truth['beads_in_clusters'] / clusters
+        axes.plot(true_times[late], truth['weighted_size'][late], color=TRUTH, lw=3, alpha=0.6,
+                  label='truth, averaged over beads')  # fmt: skip
+        axes.plot(true_times[late], per_cluster[late], '--', color=TRUTH, lw=1.5,
+                  label='truth, beads per cluster')  # fmt: skip
+        axes.set(ylabel='cluster size [beads]', ylim=(0.0, None))
+        axes.legend()
+        below.plot(times, np.gradient(_running_mean(times, size), times), color=PAPER, lw=1.2)
+        below.axhline(0.0, color='0.5', lw=1)
+        below.set(xlabel='time since the shaking event [s]', ylabel='dn/dt [1/s]')
+        for panel in (axes, below):
+            panel.grid(alpha=0.25)
 
 
 def _table(cycle: CycleFiles, tray: int) -> dict[str, NDArray[np.float64]]:
