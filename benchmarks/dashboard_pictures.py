@@ -1,7 +1,8 @@
 """Take the pictures of the live page: ``python -m benchmarks.dashboard_pictures BAG [FOLDER]``.
 
 Plays a film of the plate slowly enough for the pipeline to process all frames, and writes
-dashboard.png and dashboard_phone.png for the documentation into docs/pictures or the given folder.
+dashboard.png, dashboard_phone.png and dashboard_compare.png for the documentation into
+docs/pictures or the given folder.
 BAG is made by
 ``nanorocks simulate --scene --duration 32 --first-shake 0.5 --shake-period 20 --bag BAG``.
 """
@@ -25,9 +26,12 @@ _AFTER_S = 18
 _RATE = 0.3
 _PATIENCE_S = 300.0
 _DOMAIN = '60'
+_WIDE = {'viewport': {'width': 1440, 'height': 900}, 'color_scheme': 'light'}
+_PHONE = {'viewport': {'width': 390, 'height': 844}, 'color_scheme': 'dark'}
 _PICTURES = (
-    ('dashboard.png', {'viewport': {'width': 1440, 'height': 900}, 'color_scheme': 'light'}),
-    ('dashboard_phone.png', {'viewport': {'width': 390, 'height': 844}, 'color_scheme': 'dark'}),
+    ('dashboard.png', f'#tray-{_TRAY}', _WIDE),
+    ('dashboard_phone.png', f'#tray-{_TRAY}', _PHONE),
+    ('dashboard_compare.png', '#compare', _WIDE),
 )
 
 
@@ -45,7 +49,7 @@ def main() -> None:
     )  # fmt: skip
     url = re.findall(r'http://\S+', pipeline.stdout.readline())[0]
     try:
-        _take(f'{url}#tray-{_TRAY}', folder)
+        _take(url, folder)
     finally:
         pipeline.send_signal(2)
         pipeline.wait(10)
@@ -58,9 +62,10 @@ def _take(url: str, folder: Path) -> None:
         browser = driver.chromium.launch(
             executable_path=shutil.which('chromium'), args=['--no-sandbox', '--disable-gpu']
         )
-        pages = [(name, browser.new_page(**options)) for name, options in _PICTURES]
-        for _, page in pages:
-            page.goto(url)
+        pages = []
+        for name, view, options in _PICTURES:
+            pages.append((name, browser.new_page(**options)))
+            pages[-1][1].goto(f'{url}{view}')
         deadline = time.monotonic() + _PATIENCE_S
         while not _cooled(pages[0][1]) and time.monotonic() < deadline:
             time.sleep(0.5)

@@ -32,6 +32,7 @@ _FILM = {
         'count',
         'look',
         'colour',
+        'material',
         'density_g_cm3',
         'corners',
         'sides_mm',

@@ -59,7 +59,7 @@ def _see_through(mask: NDArray[np.uint8]) -> bytes:
     picture = np.empty((*inside.shape, 4), dtype=np.uint8)
     picture[...] = _MOVING
     opacity = np.zeros_like(inside)
-    cv2.polylines(opacity, kept, True, (255,), 2, cv2.LINE_AA)
+    cv2.polylines(opacity, kept, True, (255,), 1, cv2.LINE_AA)
     picture[..., 3] = opacity
     _, content = cv2.imencode('.png', picture, [cv2.IMWRITE_PNG_COMPRESSION, 2])
     return content.tobytes()

@@ -5,7 +5,7 @@ import { Cards } from './cards.js';
 import { ClusterChart, CorChart, SpeedChart } from './charts.js';
 import { CorComparison, SpeedComparison } from './compare.js';
 import { Cycles } from './cycles.js';
-import { savePicture, saveTable } from './exports.js';
+import { offerExports } from './exports.js';
 import { Link } from './link.js';
 import { Nodes } from './nodes.js';
 import { drawNumbers } from './numbers.js';
@@ -239,13 +239,6 @@ function tableOf(name) {
   return [columns[name], tray.rows[name].filter((row) => row[0] >= low && row[0] <= high)];
 }
 
-function saver(figure, chart, nameOf, table) {
-  const title = () => `${figure.querySelector('h3').textContent.replace(/\s+/g, ' ')}, ${nameOf().replaceAll('_', ' ')}`;
-  const fileOf = () => `${nameOf()}_${figure.id.replace('-chart', '').replace('-', '_')}`;
-  figure.querySelector('.csv').addEventListener('click', () => chart.plot && saveTable(fileOf(), ...table()));
-  figure.querySelector('.png').addEventListener('click', () => chart.plot && savePicture(fileOf(), title(), chart.plot));
-}
-
 function swatch(className, text) {
   const shown = document.createElement('span');
   const mark = document.createElement('span');
@@ -263,10 +256,10 @@ function drawKey() {
 
 const trayName = () => `tray_${chosen}_cycle_${cycles.viewOf(chosen, (frozen ?? trays).get(chosen)).cycle}`;
 for (const [name, chart] of [['speed', speeds], ['cor', cors], ['cluster', clusters]]) {
-  saver(at(`${name}-chart`), chart, trayName, () => tableOf(name));
+  offerExports(at(`${name}-chart`), chart, trayName, () => tableOf(name));
 }
 for (const [id, chart] of [['cor-comparison', comparedCors], ['speed-comparison', comparedSpeeds]]) {
-  saver(at(id), chart, () => 'trays', () => chart.table());
+  offerExports(at(id), chart, () => 'trays', () => chart.table());
 }
 for (const box of document.querySelectorAll('.zoom')) {
   const zoomed = box.dataset.of === 'compared' ? comparedAxis : axis;

@@ -14,13 +14,13 @@ function save(blob, name) {
 const cell = (value) => (value === null || value === undefined ? 'nan' : String(value));
 
 /** A table as `nanorocks analyse` writes them: names with units in the first line. */
-export function saveTable(name, columns, rows) {
+function saveTable(name, columns, rows) {
   const lines = [columns, ...rows.map((row) => row.map(cell))].map((row) => row.join(','));
   save(new Blob([`${lines.join('\n')}\n`], { type: 'text/csv' }), `${name}.csv`);
 }
 
 /** The plot as it is seen, with its title above it. */
-export function savePicture(name, title, plot) {
+function savePicture(name, title, plot) {
   const style = getComputedStyle(document.documentElement);
   const colour = (of) => style.getPropertyValue(of).trim();
   const { canvas } = plot.ctx;
@@ -36,4 +36,12 @@ export function savePicture(name, title, plot) {
   brush.fillText(title, MARGIN * scale, (MARGIN + 13) * scale);
   brush.drawImage(canvas, MARGIN * scale, (MARGIN + TITLE) * scale);
   picture.toBlob((blob) => save(blob, `${name}.png`), 'image/png');
+}
+
+/** Let the buttons of a figure save its plot; `nameOf` and `table` are asked for then. */
+export function offerExports(figure, chart, nameOf, table) {
+  const title = () => `${figure.querySelector('h3').textContent.replace(/\s+/g, ' ')}, ${nameOf().replaceAll('_', ' ')}`;
+  const fileOf = () => `${nameOf()}_${figure.id.replace('-chart', '').replace('-', '_')}`;
+  figure.querySelector('.csv').addEventListener('click', () => chart.plot && saveTable(fileOf(), ...table()));
+  figure.querySelector('.png').addEventListener('click', () => chart.plot && savePicture(fileOf(), title(), chart.plot));
 }

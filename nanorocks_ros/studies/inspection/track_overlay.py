@@ -37,6 +37,8 @@ MAGNIFICATION = 3
 # Fractional bits of the coordinates that are passed to OpenCV.
 _SHIFT = 4
 _GAP_PX = 12
+# Width of the outline of a bead; paths are thinner.
+_OUTLINE_PX = 2
 _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 
 
@@ -142,4 +144,5 @@ def _draw_beads(canvas: NDArray[np.uint8], tracks: Tracks, scale: float) -> None
     for number, position, radius, seen in zip(*columns, strict=True):
         centre = [round(float(axis) * scale - 2 ** (_SHIFT - 1)) for axis in position]
         colour = _colour(number) if seen else _HIDDEN
-        cv2.circle(canvas, centre, round(radius * scale), colour, 1, cv2.LINE_AA, _SHIFT)
+        outline = round(radius * scale), colour, _OUTLINE_PX, cv2.LINE_AA, _SHIFT
+        cv2.circle(canvas, centre, *outline)
