@@ -27,7 +27,8 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-oldest golden lint bench docs docs-pages site venv messages lock clean
+.PHONY: help demo test test-oldest test-package golden lint bench docs docs-pages site venv \
+        messages lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -60,6 +61,9 @@ test-oldest: ## Run the tests of the core, without ROS, with the oldest dependen
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
 	    PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
 	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES) $(ONCE)) $(PYTEST_ARGS)
+
+test-package: venv ## Make the wheel and run it where there is neither ROS nor this tree
+	@sh requirements/test_package.sh "$(CURDIR)/$(VENV)/bin/python" .venv-package
 
 golden: venv ## Hold every number that the commands give against test/golden/golden.json
 	@$(RUN) python -m benchmarks golden $(GOLDEN_ARGS)
@@ -104,6 +108,7 @@ lock: ## Renew the lock files in requirements/ (needs uv)
 	@$(COMPILE) --upgrade --extra messages --output-file requirements/messages.txt
 
 clean: ## Remove the environments, builds and caches
-	@rm -rf .venv .venv-jazzy .venv-messages $(OLDEST) build install log ./*.egg-info \
+	@rm -rf .venv .venv-jazzy .venv-messages .venv-package $(OLDEST) build install log \
+	    ./*.egg-info \
 	    .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -2,6 +2,7 @@
 
 import ast
 import importlib.metadata
+import json
 import os
 import re
 import subprocess
@@ -10,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+import yaml
 
 import nanorocks_ros
 
@@ -149,3 +151,36 @@ def test_an_environment_is_made_with_hashes_alone():
     assert all('--require-hashes' in call for call in calls)
     makefile = (ROOT / 'Makefile').read_text()
     assert '--generate-hashes' in makefile
+
+
+def test_requirements_of_every_day_are_no_extras():
+    requires = importlib.metadata.requires('nanorocks_ros')
+    if not any(line.startswith('shtab') for line in requires):
+        pytest.skip('the installed metadata are older than setup.cfg: make venv')
+    for name in ('av', 'shtab'):
+        lines = [line for line in requires if re.match(rf'{name}\b', line)]
+        assert lines
+        assert not any('extra' in line for line in lines)
+
+
+def test_the_package_is_typed():
+    assert (ROOT / 'nanorocks_ros' / 'py.typed').is_file()
+    assert 'nanorocks_ros = py.typed' in (ROOT / 'setup.cfg').read_text()
+
+
+def test_the_scripts_of_containers_are_valid():
+    script = ROOT / '.devcontainer' / 'entrypoint'
+    assert os.access(script, os.X_OK)
+    for path in (script, ROOT / 'requirements' / 'test_package.sh', ROOT / '.ci' / 'run'):
+        subprocess.run(['bash', '-n', str(path)], check=True)
+    assert str(script.relative_to(ROOT)) in (ROOT / 'Dockerfile').read_text()
+    settings = (ROOT / '.devcontainer' / 'devcontainer.json').read_text().splitlines()
+    built = json.loads('\n'.join(line for line in settings if not line.strip().startswith('//')))
+    assert (ROOT / '.devcontainer' / built['build']['dockerfile']).is_file()
+
+
+def test_the_citation_is_that_of_this_version():
+    citation = yaml.safe_load((ROOT / 'CITATION.cff').read_text())
+    assert citation['version'] == nanorocks_ros.__version__
+    # Until there is one.
+    assert 'doi' not in citation

@@ -13,7 +13,7 @@ from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.remedies import results_beside, with_own_files
-from nanorocks_ros.errors import ConfigurationError, NanorocksError
+from nanorocks_ros.errors import NanorocksError
 
 if TYPE_CHECKING:
     import argparse
@@ -44,7 +44,7 @@ def add_parser(commands: Any) -> None:
         epilog=_EPILOG,
     )
     add_bag(parser, many=True)
-    accept_films(parser, 'bags', _check_film)
+    accept_films(parser, 'bags', _announce_films)
     parser.add_argument(
         '-o',
         '--output',
@@ -79,21 +79,20 @@ def run(options: argparse.Namespace) -> int:
     return run_many(options) if is_batch(options) else _run_one(options)
 
 
-def _check_film(options: argparse.Namespace, film: str) -> None:
-    """Refuse a film of unknown beads: nothing in it says which of the trays it shows."""
+def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
+    """Say how films of unknown beads are measured: they do not tell which trays they show."""
     from nanorocks_ros.cli.flags import told_settings
+    from nanorocks_ros.outputs.safe_text import printable
 
     if told_settings(options, options.parameters) & {'trays', 'trays_file'}:
         return
-    folder = shlex.quote(results_beside(film, 'measured'))
-    name = shlex.quote(film)
-    raise ConfigurationError(
-        film,
-        'does not say which trays it shows',
-        f'measure a film of your own: nanorocks measure {name} --diameter-px 31 -o {folder}, with '
-        'the diameter of a bead in px; or name the trays of the flight: '
-        f'nanorocks analyse {name} --trays 3',
+    name, folder = shlex.quote(films[0]), shlex.quote(results_beside(films[0], 'measured'))
+    text = (
+        f'{films[0]}: does not say which trays it shows; tray 1 of the flight is assumed; name '
+        f'another: nanorocks analyse {name} --trays 3; or measure a film of your own, with the '
+        f'diameter of a bead in px: nanorocks measure {name} --diameter-px 31 -o {folder}'
     )
+    print(f'nanorocks: {printable(text)}', file=sys.stderr)
 
 
 def _run_one(options: argparse.Namespace) -> int:

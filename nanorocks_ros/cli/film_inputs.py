@@ -17,13 +17,13 @@ _ARGUMENT = 'film_argument'
 def accept_films(
     parser: argparse.ArgumentParser,
     argument: str,
-    check: Callable[[argparse.Namespace, str], None] = lambda options, film: None,
+    announce: Callable[[argparse.Namespace, list[str]], None] = lambda options, films: None,
 ) -> None:
     """Let an argument of a command, which names bags, name films as well.
 
-    Before a film is imported, which takes time, `check` may refuse it.
+    Before films are imported, which takes time, `announce` may say something of them.
     """
-    parser.set_defaults(**{_ARGUMENT: argument, 'check_film': check})
+    parser.set_defaults(**{_ARGUMENT: argument, 'announce_films': announce})
 
 
 def use_imports(options: argparse.Namespace) -> None:
@@ -43,9 +43,9 @@ def use_imports(options: argparse.Namespace) -> None:
     is_list = isinstance(value, list)
     names = [name for text in value for name in _expanded(text)] if is_list else [value]
     options.named = names
-    for name in names:
-        if _is_film(name):
-            options.check_film(options, name)
+    films = [name for name in names if _is_film(name)]
+    if films:
+        options.announce_films(options, films)
     recordings = [_recording(name) for name in names]
     setattr(options, argument, recordings if is_list else recordings[0])
 

@@ -32,7 +32,7 @@ def test_commands_on_a_bag_take_films(tmp_path, command):
 def test_a_pattern_names_films_and_bags(tmp_path):
     for name in ('b.avi', 'a.avi'):
         write_video(tmp_path / name, range(4))
-    options = build_parser().parse_args(['analyse', str(tmp_path / '*.avi'), '--trays', '3'])
+    options = build_parser().parse_args(['analyse', str(tmp_path / '*.avi')])
     use_imports(options)
     cache = tmp_path / '.nanorocks'
     assert options.bags == [str(cache / 'a.avi'), str(cache / 'b.avi')]
@@ -45,11 +45,18 @@ def test_what_is_no_film_is_left_to_the_reader_of_bags(tmp_path, capsys):
     assert 'Traceback' not in capsys.readouterr().err
 
 
-def test_a_film_of_unknown_beads_is_refused_before_it_is_imported(tmp_path, capsys):
+def test_analyse_says_first_how_a_film_of_unknown_beads_is_measured(tmp_path, capsys):
     film = write_video(tmp_path / 'my film.avi', range(4))
-    assert main(['analyse', str(film)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert 'does not say which trays it shows' in line
-    assert f"nanorocks measure '{film}' --diameter-px 31 -o 'my film_measured'" in line
-    assert f"nanorocks analyse '{film}' --trays 3" in line
-    assert not (tmp_path / '.nanorocks').exists()
+    use_imports(build_parser().parse_args(['analyse', str(film)]))
+    lines = capsys.readouterr().err.splitlines()
+    assert 'does not say which trays it shows' in lines[0]
+    assert f"nanorocks measure '{film}' --diameter-px 31 -o 'my film_measured'" in lines[0]
+    assert f"nanorocks analyse '{film}' --trays 3" in lines[0]
+    assert 'imported, 4 frames' in lines[-1]
+
+
+@pytest.mark.parametrize('told', [('--trays', '3'), ('--trays-file', 'mine.yaml')])
+def test_analyse_says_nothing_where_the_trays_are_told(tmp_path, capsys, told):
+    film = write_video(tmp_path / 'a.avi', range(4))
+    use_imports(build_parser().parse_args(['analyse', str(film), *told]))
+    assert 'which trays' not in capsys.readouterr().err

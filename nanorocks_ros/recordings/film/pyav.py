@@ -33,5 +33,5 @@ def pyav(where: str, alternative: str = '') -> Any:
         raise ConfigurationError(
             where,
             'needs PyAV, which is not installed',
-            f"{remedy}: pip install 'nanorocks_ros[video]'",
+            f'{remedy}: pip install av',
         ) from error

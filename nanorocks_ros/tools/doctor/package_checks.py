@@ -22,7 +22,6 @@ _PURPOSES = {
     'cluster': 'work on other machines (--scheduler)',
     'dashboard': 'the live page (nanorocks dashboard)',
     'parquet': 'tables as .parquet files',
-    'video': 'reading videos (nanorocks import) and writing .mp4',
 }
 
 
@@ -61,8 +60,11 @@ def libraries() -> list[Finding]:
             for requirement in requirements
             if _applies(requirement, extra) and requirement not in needed
         ]
-        purpose = _PURPOSES.get(extra, 'an extra')
-        findings.append(_library_finding(f'extra [{extra}]', additional, Status.WARNING, purpose))
+        # An extra of the previous release may be empty.
+        if additional:
+            purpose = _PURPOSES.get(extra, 'an extra')
+            finding = _library_finding(f'extra [{extra}]', additional, Status.WARNING, purpose)
+            findings.append(finding)
     return findings
 
 

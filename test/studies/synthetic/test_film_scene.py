@@ -145,7 +145,7 @@ def test_a_stream_of_h264_has_the_size_asked_for():
 def test_without_pyav_h264_is_refused_before_anything_is_written(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'av', None)
     recorder = SceneRecorder(SIMULATION, SCENE, 0.1)
-    with pytest.raises(ConfigurationError, match=r"h264: needs PyAV.*pip install 'nanorocks_ros"):
+    with pytest.raises(ConfigurationError, match=r'h264: needs PyAV.*pip install av'):
         recorder.into_bag(tmp_path / 'bag', CompressionSettings(codec='h264'), 90, nothing)
     assert not (tmp_path / 'bag').exists()
 

@@ -85,7 +85,7 @@ def test_an_interruption_leaves_no_video(tmp_path):
 
 def test_without_pyav_it_says_what_to_do(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'av', None)
-    with pytest.raises(ConfigurationError, match=r"\.avi file, or run: pip install 'nanorocks_ro"):
+    with pytest.raises(ConfigurationError, match=r'\.avi file, or run: pip install av'):
         filmed(tmp_path / 'run.mp4')
     assert list(tmp_path.iterdir()) == []
 
