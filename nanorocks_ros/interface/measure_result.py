@@ -83,7 +83,7 @@ class MeasureResult(Result):
         """Cycles, by the decay of the speeds and contacts together; None where not read."""
         if not any(tray.decay_read for tray in self._measured.trays):
             return None
-        from nanorocks_ros.interface.reading import read
+        from nanorocks_ros.interface.analysis import read
 
         return read(self.folder)
 
