@@ -9,17 +9,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 
 from benchmarks.contacts import METRE_PX, contacts_of, film
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import BLACK, BLUE, TWO_COLUMNS
 from nanorocks_ros.records import PairCollision, Rebound, Tracks, TrayImage
-
-mpl.use('Agg')
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 _PAIRS, _WALLS = 0.89, 0.97
 _SECONDS = 25.0
@@ -28,7 +25,7 @@ _SHOWN = 10
 _AROUND = 46
 # Largest distance of positions from the lines, [px].
 _STRAIGHT = 0.5
-_COLOURS = '#14406b', '#7a1f8a'
+_COLOURS = BLUE, BLACK
 
 Film = list[tuple[TrayImage, Tracks]]
 
@@ -123,34 +120,35 @@ def write(folder: Path) -> None:
     rebound, pair = _best(
         list(contacts_of(load_trays()[1], (tracks for _, tracks in frames))), frames
     )
-    figure = Figure(figsize=(9.0, 4.9), layout='constrained')
-    left, right = figure.subplots(1, 2)
-    _draw(left, frames, rebound, rebound.place)
-    left.axvline(-0.5, color='black', lw=1.0)
-    ratio = rebound.outgoing.value / rebound.incoming.value
-    error = np.hypot(rebound.outgoing.error, rebound.incoming.error) / rebound.incoming.value
-    left.set_title(
-        f'A rebound: {1e3 * rebound.incoming.value:.2f} to the wall, '
-        f'{1e3 * rebound.outgoing.value:.2f} mm/s from it\n'
-        f'ratio {ratio:.3f} ± {error:.3f} (true: {_WALLS})',
-        fontsize=10,
-    )
-    _draw(right, frames, pair, pair.place + 0.5 * pair.separation)
-    first_centre, second_centre = pair.place, pair.place + pair.separation
-    right.plot(
-        *(np.array([first_centre, second_centre]) * METRE_PX - 0.5).T, '-', color='black', lw=1.5
-    )
-    normal = pair.separation / np.hypot(*pair.separation)
-    approach, parting = (
-        1e3 * abs(float((velocity[1] - velocity[0]) @ normal))
-        for velocity in (pair.before, pair.after)
-    )
-    right.set_title(
-        f'A collision: {approach:.2f} and {parting:.2f} mm/s along the line of centres (black),\n'
-        f'{np.hypot(*pair.separation) / pair.radii.sum():.3f} diameters apart in the picture',
-        fontsize=10,
-    )
-    figure.savefig(folder / 'rebounds.png', dpi=110)
+    with figure_file(folder / 'rebounds.png', TWO_COLUMNS, 95.0) as figure:
+        left, right = figure.subplots(1, 2)
+        _draw(left, frames, rebound, rebound.place)
+        left.axvline(-0.5, color='black', lw=1.0)
+        ratio = rebound.outgoing.value / rebound.incoming.value
+        error = np.hypot(rebound.outgoing.error, rebound.incoming.error) / rebound.incoming.value
+        left.set_title(
+            f'A rebound: {1e3 * rebound.incoming.value:.2f} to the wall, '
+            f'{1e3 * rebound.outgoing.value:.2f} mm/s from it\n'
+            f'ratio {ratio:.3f} ± {error:.3f} (true: {_WALLS})',
+        )
+        _draw(right, frames, pair, pair.place + 0.5 * pair.separation)
+        first_centre, second_centre = pair.place, pair.place + pair.separation
+        right.plot(
+            *(np.array([first_centre, second_centre]) * METRE_PX - 0.5).T,
+            '-',
+            color='black',
+            lw=1.5,
+        )
+        normal = pair.separation / np.hypot(*pair.separation)
+        approach, parting = (
+            1e3 * abs(float((velocity[1] - velocity[0]) @ normal))
+            for velocity in (pair.before, pair.after)
+        )
+        apart = np.hypot(*pair.separation) / pair.radii.sum()
+        right.set_title(
+            f'A collision: {approach:.2f} and {parting:.2f} mm/s along the line\n'
+            f'of centres (black), {apart:.3f} diameters apart',
+        )
 
 
 if __name__ == '__main__':

@@ -5,37 +5,25 @@ Writes cooling_gas.png and clusters.png for the documentation, into docs/picture
 
 from __future__ import annotations
 
-import math
 import sys
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.colors import LogNorm
 from scipy.optimize import curve_fit
 
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import BLACK, FITTED, MAP, SERIES, SKY, TWO_COLUMNS
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules
-
-mpl.use('Agg')
-
-from matplotlib import pyplot as plt
-from matplotlib.collections import EllipseCollection, LineCollection
-from matplotlib.colors import LogNorm
 
 _MM = 1e3
 _RADIUS = 0.001
 _MASS = 4.94e-6
 _MEAN_SPEED = 0.007
-_GREY = '0.82'
-_STYLE = {
-    'font.size': 10,
-    'axes.titlesize': 10,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'savefig.dpi': 130,
-}
-
 # Tray 1 and its restitutions.
 _TRAY = (0.015, 0.015, 0.003)
 _BEADS = 15
@@ -56,9 +44,10 @@ _STICKY_MOMENTS = (0.5, 6.0, 20.0)
 def main() -> None:
     """Draw both."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else _PICTURES
-    with plt.rc_context(_STYLE):
-        cooling_gas().savefig(folder / 'cooling_gas.png')
-        clusters().savefig(folder / 'clusters.png')
+    with figure_file(folder / 'cooling_gas.png', TWO_COLUMNS, 75.0) as figure:
+        cooling_gas(figure)
+    with figure_file(folder / 'clusters.png', TWO_COLUMNS, 70.0) as figure:
+        clusters(figure)
 
 
 def shaken(box, count, seed, **rules):
@@ -81,13 +70,11 @@ def shaken(box, count, seed, **rules):
     return HardSphereGas(beads, CollisionRules(box=box, **rules))
 
 
-def cooling_gas():
+def cooling_gas(figure):
     """Tray 1 at three moments; the mean speed of many runs, their mean, and Haff's law."""
-    figure = plt.figure(figsize=(12.5, 4.3), layout='constrained')
-    left, right = figure.subfigures(1, 2, width_ratios=(1.75, 1.0))
+    left, right = figure.subfigures(1, 2, width_ratios=(1.6, 1.0))
     _draw_moments(left)
     _draw_decay(right.subplots())
-    return figure
 
 
 def _draw_moments(figure):
@@ -101,12 +88,12 @@ def _draw_moments(figure):
         speeds = np.linalg.norm(course.velocities[k], axis=1) * _MM
         first = max(k - round(_TRAIL / 0.02), 0)
         trails = np.moveaxis(course.positions[first : k + 1, :, :2] * _MM, 0, 1)
-        colours = plt.cm.viridis(norm(speeds))
+        colours = mpl.colormaps[MAP](norm(speeds))
         panel.add_collection(LineCollection(trails, colors=colours, linewidths=1.6, alpha=0.6))
         _discs(panel, course.positions[k], colours)
-        _frame(panel, _TRAY, f't = {moment:g} s, mean {speeds.mean():.1f} mm/s')
+        _frame(panel, _TRAY, f't = {moment:g} s: {speeds.mean():.1f} mm/s')
     panels[0].set_ylabel('y [mm]')
-    colours = mpl.cm.ScalarMappable(norm, 'viridis')
+    colours = mpl.cm.ScalarMappable(norm, MAP)
     bar = figure.colorbar(colours, ax=panels, location='bottom', shrink=0.5, aspect=35)
     bar.set_label('speed of a bead [mm/s]')
     bar.set_ticks([0.5, 1, 2, 5, 10], labels=['0.5', '1', '2', '5', '10'])
@@ -134,7 +121,7 @@ def _discs(panel, positions, colours):
 
 def _frame(panel, box, title):
     panel.set(xlim=(0, box[0] * _MM), ylim=(0, box[1] * _MM), aspect='equal', xlabel='x [mm]')
-    panel.set_title(title)
+    panel.set_title(title, fontsize=7.5)
     ticks = np.linspace(0.0, box[0] * _MM, 4 if box[0] < 0.02 else 6)
     panel.set(xticks=ticks, yticks=ticks)
     panel.spines[:].set_visible(True)
@@ -152,48 +139,46 @@ def _draw_decay(panel):
     mean = speeds.mean(axis=0)
     used = times >= _FIT_FROM
     (speed, tau), _ = curve_fit(_haff, times[used], np.log(mean[used]), (_MEAN_SPEED, 5.0))
-    panel.loglog(times, speeds.T * _MM, color=_GREY, linewidth=0.7, zorder=1)
-    panel.loglog([], [], color=_GREY, linewidth=0.7, label=f'{_RUNS} runs of {_BEADS} beads')
-    panel.loglog(times, mean * _MM, color='black', linewidth=2.0, label='their mean')
+    panel.loglog(times, speeds.T * _MM, color=SKY, linewidth=0.7, zorder=1)
+    panel.loglog([], [], color=SKY, linewidth=0.7, label=f'{_RUNS} runs of {_BEADS} beads')
+    panel.loglog(times, mean * _MM, color=BLACK, linewidth=2.0, label='their mean')
     panel.loglog(
         times,
         np.exp(_haff(times, speed, tau)) * _MM,
-        color='tab:red',
+        color=FITTED,
         linestyle='--',
-        label=f'Haff: {speed * _MM:.2f} mm/s / (1 + t / {tau:.2f} s)',
+        label=f'Haff: {speed * _MM:.2f} mm/s, {tau:.2f} s',
     )
     panel.set(xlabel='time since shaking [s]', ylabel='mean speed [mm/s]', xlim=times[[0, -1]])
     panel.xaxis.set_major_formatter('{x:g}')
     panel.yaxis.set_major_formatter('{x:g}')
-    panel.legend(loc='lower left', frameon=False)
+    panel.legend(loc='lower left')
     panel.set_title('tray 1, restitution 0.89, walls 0.99')
 
 
-def clusters():
+def clusters(figure):
     """A gas that sticks, at three moments, each body of two beads or more in a colour."""
-    figure = plt.figure(figsize=(12.5, 4.8), layout='constrained')
     panels = figure.subplots(1, len(_STICKY_MOMENTS), sharey=True)
     gas = shaken(_WIDE_TRAY, _STICKY_BEADS, 5, sticking_speed=_STICKING_SPEED, **_RULES)
     course = gas.follow(_STICKY_MOMENTS[-1], _STICKY_MOMENTS)
     for k, (panel, moment) in enumerate(zip(panels, _STICKY_MOMENTS, strict=True)):
         sizes = np.bincount(course.bodies[k], minlength=_STICKY_BEADS)
         _discs(panel, course.positions[k], _body_colours(course.bodies[k], sizes))
-        counted = f'{np.count_nonzero(sizes)} bodies, the largest of {sizes.max()} beads'
+        counted = f'{np.count_nonzero(sizes)} bodies, up to {sizes.max()} beads'
         _frame(panel, _WIDE_TRAY, f't = {moment:g} s: {counted}')
     panels[0].set_ylabel('y [mm]')
     figure.suptitle(
         f'{_STICKY_BEADS} beads that stick below {_STICKING_SPEED * _MM:g} mm/s; '
         'single beads white, each body in its colour',
-        fontsize=11,
+        x=0.01,
+        ha='left',
     )
-    return figure
 
 
 def _body_colours(bodies, sizes):
     """Colours by the number of the body, by which it keeps its colour; single beads white."""
-    hues = (bodies * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0
-    strengths = 0.55 + 0.35 * (bodies % 3) / 2.0
-    colours = mpl.colors.hsv_to_rgb(np.column_stack((hues, strengths, 1.05 - 0.3 * strengths)))
+    palette = np.array([mpl.colors.to_rgb(colour) for colour in SERIES])
+    colours = palette[bodies % len(SERIES)]
     colours[sizes[bodies] == 1] = 1.0
     return colours
 

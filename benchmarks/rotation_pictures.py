@@ -5,20 +5,25 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 
 from benchmarks import rough_gas as gas
 from benchmarks import rough_sharing as energy
 from benchmarks.rotation import NOISE, RUNS, SEEDS, STEP, TIMES, TOGETHER, curves
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.outputs.figure_files import figure_file
+from nanorocks_ros.outputs.figure_style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    TWO_COLUMNS,
+    VERMILION,
+    plain_numbers,
+)
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
 from nanorocks_ros.physics.rough_spheres import temperature_ratio_course
 
-mpl.use('Agg')
-from matplotlib.figure import Figure
-
-COLOURS = ('#30506f', '#c23b22', '#e0a458', '#5b8c5a')
+COLOURS = (BLUE, VERMILION, ORANGE, GREEN)
 CASES = (gas.SMOOTH, gas.SMOOTH_WALLS, gas.BEADS, gas.RUBBING)
 SHARING_TIMES = np.linspace(0.0, 20.0, 41)
 CYCLES = 6
@@ -28,15 +33,14 @@ EDGES = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0]) * 1e-3
 
 def main(folder):
     """Write rotation.png."""
-    figure = Figure(figsize=(11.0, 8.4), layout='constrained')
-    axes = figure.subplots(2, 2)
-    _bulk(axes[0, 0])
-    _tray(axes[0, 1])
-    _widths(axes[1, 0])
-    _readings(axes[1, 1])
-    for panel in axes.flat:
-        panel.grid(alpha=0.25)
-    figure.savefig(Path(folder) / 'rotation.png', dpi=90)
+    with figure_file(Path(folder) / 'rotation.png', TWO_COLUMNS, 150.0) as figure:
+        axes = figure.subplots(2, 2)
+        _bulk(axes[0, 0])
+        _tray(axes[0, 1])
+        _widths(axes[1, 0])
+        _readings(axes[1, 1])
+        for panel in axes.flat:
+            panel.grid(alpha=0.25)
 
 
 def _bulk(axes):
@@ -54,8 +58,8 @@ def _bulk(axes):
     axes.set_ylim(0.0)
     axes.set_xlabel('collisions of each bead')
     axes.set_ylabel('rotation over translation')
-    axes.set_title('without walls: theory (lines), 500 simulated beads', fontsize=10)
-    axes.legend(frameon=False, fontsize=9)
+    axes.set_title('without walls: theory (lines), 500 simulated beads')
+    axes.legend()
 
 
 def _tray(axes):
@@ -66,8 +70,8 @@ def _tray(axes):
     axes.set_xlabel('time since shaking [s]')
     axes.set_ylabel('rotation over translation')
     axes.set_ylim(0.0)
-    axes.set_title('tray 1, started without rotation', fontsize=10)
-    axes.legend(frameon=False, fontsize=9)
+    axes.set_title('tray 1, started without rotation')
+    axes.legend()
 
 
 def _widths(axes):
@@ -83,13 +87,11 @@ def _widths(axes):
     axes.axvline(5.0, color='black', lw=0.7, ls=':')
     axes.set_xscale('log')
     axes.set_yscale('log')
-    axes.xaxis.set_major_formatter('{x:g}')
-    axes.xaxis.set_minor_formatter('{x:g}')
-    axes.tick_params(axis='x', which='both', length=4, pad=4)
+    plain_numbers(axes.xaxis)
     axes.set_xlabel(f'collision speed, {RELATIVE_TO_MEAN_SPEED:g} v [mm/s]')
     axes.set_ylabel("half width (68 %) of the paper's COR")
-    axes.set_title(f'tray 1, mean of {TOGETHER} cycles', fontsize=10)
-    axes.legend(frameon=False, fontsize=8)
+    axes.set_title(f'tray 1, mean of {TOGETHER} cycles')
+    axes.legend()
 
 
 def _readings(axes):
@@ -121,8 +123,8 @@ def _readings(axes):
     axes.set_ylim(0.0, 1.3)
     axes.set_xlabel('friction μ of beads and walls, β = 0.4')
     axes.set_ylabel('restitution of the beads as read')
-    axes.set_title('rough beads taken for smooth; the truth is 0.89', fontsize=10)
-    axes.legend(frameon=False, fontsize=8, ncols=2)
+    axes.set_title('rough beads taken for smooth; the truth is 0.89')
+    axes.legend(ncols=2)
 
 
 if __name__ == '__main__':

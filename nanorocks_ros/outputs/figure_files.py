@@ -5,18 +5,17 @@ Tested by ``test/outputs/test_figure_files.py``.
 
 from __future__ import annotations
 
-import shlex
-import sys
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.command_line import command_line, program_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from matplotlib.figure import Figure
 
@@ -37,7 +36,7 @@ def figure_file(
         None: the figure is drawn and not written.
     width, height : float, [mm]
     command : str, optional
-        Written into the file with the version; by default how this process was started.
+        Written into the file with the version; by default that of this process.
 
     Yields
     ------
@@ -63,8 +62,9 @@ def figure_file(
         yield figure
         if path is None:
             return
+        told = command or command_line() or program_name()
         with atomic_file(path) as part:
-            figure.savefig(part, metadata=_metadata(path.suffix, command or command_line()))
+            figure.savefig(part, metadata=_metadata(path.suffix, told))
 
 
 def check_picture(path: Path, flag: str = 'figure') -> None:
@@ -78,12 +78,6 @@ def check_picture(path: Path, flag: str = 'figure') -> None:
         raise ConfigurationError(
             flag, f'{path} ends in none of {", ".join(PICTURES)}', 'name such a file'
         )
-
-
-def command_line() -> str:
-    """How this process was started, without the folder of its program."""
-    program, *arguments = sys.argv or ['python']
-    return shlex.join([Path(program).name or 'python', *arguments])
 
 
 def _metadata(suffix: str, command: str) -> dict[str, str]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.outputs.figure_files import command_line
+from nanorocks_ros.outputs.command_line import command_line, program_name
 from nanorocks_ros.outputs.report_style import STYLE
 
 if TYPE_CHECKING:
@@ -140,8 +140,9 @@ def made_line(command: str = '') -> str:
     command : str, optional
         That of this process if not given.
     """
+    told = command or command_line() or program_name()
     date = datetime.now(UTC).strftime('%Y-%m-%d %H:%M UTC')
-    return f'Made on {date} with nanorocks_ros {__version__} by `{command or command_line()}`.'
+    return f'Made on {date} with nanorocks_ros {__version__} by `{told}`.'
 
 
 def _table(table: Table) -> str:

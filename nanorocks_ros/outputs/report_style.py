@@ -18,6 +18,8 @@ nav ol { columns: 2 18rem; } a { color: var(--link); }
 figure { margin: 1rem 0; } figcaption { padding: .3rem 0; }
 figure img { max-width: 100%; height: auto; background: #fff; padding: 4px; border-radius: 4px; }
 .scroll { overflow-x: auto; }
+@media (max-width: 600px) {
+  figure.picture { overflow-x: auto; } figure.picture img { width: 640px; max-width: none; } }
 table { border-collapse: collapse; font-size: .92rem; overflow-wrap: normal; }
 th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: left;
   vertical-align: top; }
@@ -34,6 +36,6 @@ td.n { font-variant-numeric: tabular-nums; white-space: nowrap; }
   figure.picture, tr { break-inside: avoid; } figure img { max-height: 230mm; padding: 0; }
   thead { display: table-header-group; } .scroll { overflow: visible; }
   table { font-size: 7.5pt; width: 100%; overflow-wrap: anywhere; }
-  th, td { padding: 1pt 3pt; } td.n { white-space: normal; }
+  th, td { padding: 1pt 3pt; } th { overflow-wrap: break-word; } td.n { white-space: normal; }
 }
 """

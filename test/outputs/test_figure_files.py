@@ -51,7 +51,7 @@ def test_a_figure_says_which_version_and_command_made_it(tmp_path, suffix):
 
 def test_the_command_is_that_of_the_process_without_the_folder_of_its_program(tmp_path):
     code = (
-        'import sys; from nanorocks_ros.outputs.figure_files import command_line; '
+        'import sys; from nanorocks_ros.outputs.command_line import command_line; '
         "sys.argv = ['/opt/bin/nanorocks', 'figure', 'a b']; print(command_line())"
     )
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)

@@ -172,8 +172,12 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
 
 
 def _data(options: argparse.Namespace, source: Path) -> CorData:
-    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
+    from nanorocks_ros.experiment.trays import tray_by_number
+    from nanorocks_ros.studies.analysis.published_cycles import (
+        published_cycles,
+        published_lines,
+        truth_of,
+    )
     from nanorocks_ros.studies.decays.cooling_curves import (
         read_cycles,
         species_cycles,
@@ -181,11 +185,12 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
     )
     from nanorocks_ros.studies.decays.cooling_windows import cooling_window, span_of
     from nanorocks_ros.studies.figures.cor_figures import CorData
+    from nanorocks_ros.studies.results.results_provenance import trays_of_results
 
     table, number = speed_table(source, options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(load_trays(trays_file_of(table.parent)), number)
+    tray = tray_by_number(trays_of_results(table.parent), number)
     cycles = read_cycles(table)
     window = cooling_window(table)
     default_span = (window.first, window.last) if window else (_FIRST, _LAST)
@@ -200,6 +205,9 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
         span=span_of(options.first, options.last, default_span),
         start=window.start if window else 0.0,
         wall_restitution=options.wall_restitution,
+        published=tuple(
+            published_lines(published_cycles(table, number), truth_of(table.parent, number))
+        ),
     )
 
 

@@ -57,17 +57,17 @@ def add_parser(kinds: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, draw and print, and return the exit code."""
-    from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.experiment.trays import tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
     from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
+    from nanorocks_ros.studies.results.results_provenance import trays_of_results
 
     path = Path(options.output)
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
         raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
-    tray = tray_by_number(load_trays(options.trays or trays_file_of(table.parent)), number)
+    tray = tray_by_number(trays_of_results(table.parent, options.trays), number)
     cycles = read_cycles(table)
     values = _draw_figure(options, table, tray, cycles)
     if options.json:
@@ -104,7 +104,7 @@ def _draw_figure(
     span = span_of(options.first, options.last, default_span)
     if options.kind == 'decay':
         species = species_cycles(table, tray)
-        return decay_figure(
+        values = decay_figure(
             path,
             tray,
             cycles,
@@ -114,9 +114,9 @@ def _draw_figure(
             start=start,
             published=lines,
         )
+        return {'published': lines, **values}
     cycles, span = cooling_part(cycles, span, start)
-    return instantaneous_values(
-        instantaneous_figure(
-            path, tray, cycles, wall_restitution=walls, span=span, published=lines
-        )
+    cor = instantaneous_figure(
+        path, tray, cycles, wall_restitution=walls, span=span, published=lines
     )
+    return {'published': lines, **instantaneous_values(cor)}

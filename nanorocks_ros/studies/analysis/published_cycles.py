@@ -1,6 +1,6 @@
 """What `nanorocks analyse` published of cycles: figures show it first.
 
-Tested by ``test/studies/analysis/test_published_cycles.py``.
+Tested by ``test/cli/figures/test_published_first.py``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.records import CorEstimate, CorRelation, Headline, headline_in_words
 from nanorocks_ros.records.result_words import RELATIONS, flags_in_words, reason_of
 from nanorocks_ros.studies.analysis.result_tables import read_columns
-from nanorocks_ros.studies.analysis.results_folder import BAG_NAME, truth_keys
+from nanorocks_ros.studies.analysis.results_folder import truth_keys
 from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+from nanorocks_ros.studies.results.results_provenance import BAG_NAME
 from nanorocks_ros.wire.array_layouts import from_array, layout
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Interval
 
-_LETTERS = 100
+_LETTERS = 112
 _ALONE = ('joint', 'decay', 'contact')
 _NAMES = {'joint': 'both together', 'decay': 'decay alone', 'contact': 'contacts alone'}
 _SHOWN_BY = {Headline.JOINT: 'joint', Headline.DECAY: 'decay', Headline.CONTACTS: 'contact'}

@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.figure_files import figure_file
-from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TWO_COLUMNS
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles
 
@@ -96,6 +96,8 @@ def _draw(axes: Axes, means: TrayMeans, cycles: Sequence[CycleSpeeds]) -> None:
         axes.plot(times, law, color=FITTED, lw=1.2, ls='--', label="Haff's law, mean v0 and tau")
     axes.set_xscale('log')
     axes.set_yscale('log')
+    plain_numbers(axes.xaxis)
+    plain_numbers(axes.yaxis)
     axes.autoscale_view()
     axes.set_ylabel('mean speed [mm/s]')
     some = '' if len(cycles) >= means.cycles else f', {len(cycles)} of them drawn'

@@ -5,11 +5,10 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.html_report import (
@@ -18,8 +17,6 @@ from nanorocks_ros.outputs.html_report import (
     Table,
     made_line,
     number,
-    with_error,
-    with_interval,
     write_report,
 )
 from nanorocks_ros.outputs.safe_text import counted
@@ -28,6 +25,13 @@ from nanorocks_ros.settings import PipelineSettings, priors_in_words, rows
 from nanorocks_ros.studies.batch.batch_analysis import merged_notes
 from nanorocks_ros.studies.batch.batch_figure import decays_figure
 from nanorocks_ros.studies.batch.batch_statistics import statistics_section
+from nanorocks_ros.studies.batch.batch_words import (
+    conclusions,
+    interval_cell,
+    known_trays,
+    mean_cell,
+    measured_cell,
+)
 from nanorocks_ros.studies.batch.campaign_means import means_as_json
 from nanorocks_ros.studies.batch.mixed_recordings import mixed_recordings
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
@@ -87,30 +91,12 @@ def write_batch_report(
                 sections.insert(_AFTER_FIGURES, gas)
             if batch.failed:
                 sections.insert(0, _failures(batch))
-            conclusion = ' '.join([*_conclusions(together), *mixed])
+            conclusion = ' '.join([*conclusions(together), *mixed])
             write_report(path, 'NanoRocks, all recordings', conclusion, sections, made)
     except OSError as error:
         raise RecordingError(
             str(path), f'cannot be written ({error.strerror})', 'make room for its pictures'
         ) from error
-
-
-def _conclusions(together: Combined) -> list[str]:
-    """The restitution of each tray, by all of its cycles, in a sentence each."""
-    if not _known(together):
-        return ['No cycle after a shaking event was found: there is no restitution.']
-    lines = []
-    for tray in _known(together):
-        values = means_as_json(tray)
-        beads, walls = (_interval(values, f'{kind}restitution') for kind in ('', 'wall_'))
-        source = f', by {values["headline"]}' if values['headline'] else ''
-        lines.append(
-            f'Tray {tray.tray}: restitution of the beads {beads}, of the walls {walls}, from '
-            f'{counted(tray.cycles, "cycle")}{source}.'
-            if beads != '–'
-            else f'Tray {tray.tray}: no restitution from {counted(tray.cycles, "cycle")}.'
-        )
-    return [*lines, 'Brackets are intervals of 95 %.']
 
 
 def _failures(batch: Batch) -> Section:
@@ -139,7 +125,7 @@ def _restitutions(together: Combined, prior: PriorSettings) -> Section:
             Table(
                 head=('tray', 'cycles', 'decays left out', 'source', 'beads', 'walls', 'rebounds',
                       'collisions', 'tension'),
-                rows=[_together(tray) for tray in _known(together)],
+                rows=[_together(tray) for tray in known_trays(together)],
                 caption='What decays, rebounds and collisions of all cycles say together. What is '
                 'not known of tray, camera and start is the same in all of them: it is part of '
                 'the interval, and does not become less with more cycles. A dash: hardly known. '
@@ -153,10 +139,10 @@ def _restitutions(together: Combined, prior: PriorSettings) -> Section:
                 head=('tray', 'COR of a cycle', "by the paper's closed form", 'v0 [mm/s]',
                       'peak [mm/s]', 'tau [s]'),
                 rows=[
-                    (str(tray.tray), *(_mean(tray, name, factor) for name, factor in (
+                    (str(tray.tray), *(mean_cell(tray, name, factor) for name, factor in (
                         ('cycle_restitution', 1.0), ('paper_restitution', 1.0),
                         ('initial_speed', _MM), ('peak_speed', _MM), ('haff_time', 1.0))))
-                    for tray in _known(together)
+                    for tray in known_trays(together)
                 ],
                 caption='Means over the cycles ± scatter of a single cycle, as the paper reports '
                 'them over its 178 runs; in brackets how many cycles are known. v0 and tau count '
@@ -172,10 +158,6 @@ def _unread(together: Combined) -> list[str]:
     return [f'{notice}.' for notice in together.notices]
 
 
-def _known(together: Combined) -> list[TrayMeans]:
-    return [tray for _, tray in sorted(together.trays.items()) if tray.cycles]
-
-
 def _together(tray: TrayMeans) -> tuple[str, ...]:
     values = means_as_json(tray)
     return (
@@ -183,55 +165,31 @@ def _together(tray: TrayMeans) -> tuple[str, ...]:
         str(values['cycles_read']),
         str(values['decays_left_out']),
         values['headline'] or '–',
-        _interval(values, 'restitution'),
-        _interval(values, 'wall_restitution'),
+        interval_cell(values, 'restitution'),
+        interval_cell(values, 'wall_restitution'),
         str(values['rebounds']),
         str(values['collisions']),
         number(values['tension'], 2),
     )
 
 
-def _interval(values: dict[str, Any], name: str, factor: float = 1.0) -> str:
-    middle, low, high = (values.get(f'{name}{end}') for end in ('', '_lower', '_upper'))
-    if low is None or high is None:
-        return '–' if low is None and high is None else _one_sided(low, high, factor)
-    if middle is None:
-        return f'{number(low, 3, factor)} to {number(high, 3, factor)}'
-    return with_interval(middle, (low, high), factor)
-
-
-def _one_sided(low: float | None, high: float | None, factor: float) -> str:
-    return (
-        f'above {number(low, 3, factor)}' if high is None else f'below {number(high, 3, factor)}'
-    )
-
-
-def _mean(tray: TrayMeans, name: str, factor: float = 1.0) -> str:
-    mean = tray.means[name]
-    if not mean.cycles:
-        return '–'
-    if mean.cycles == 1:
-        return f'{number(mean.mean, 3, factor)} (1)'
-    return f'{with_error(mean.mean, mean.scatter, factor)} ({mean.cycles})'
-
-
 def _clusters(together: Combined) -> Section:
     in_mm = together.size_unit == 'm'
     size = 'correlation length [mm]' if in_mm else 'cluster size [beads]'
     rows = []
-    for tray in _known(together):
+    for tray in known_trays(together):
         values = means_as_json(tray)
         status = (values['sticking_status'] or 'not looked for').replace('_', ' ')
         merges = values['merges']
         rows.append(
             (
                 str(tray.tray),
-                _interval(values, 'sticking_speed', _MM),
+                interval_cell(values, 'sticking_speed', _MM),
                 status,
                 '–' if merges is None else str(merges),
-                _mean(tray, 'cluster_size', _MM if in_mm else 1.0),
-                _mean(tray, 'bodies'),
-                _mean(tray, 'onset'),
+                mean_cell(tray, 'cluster_size', _MM if in_mm else 1.0),
+                mean_cell(tray, 'bodies'),
+                mean_cell(tray, 'onset'),
             )
         )
     return Section(
@@ -252,7 +210,7 @@ def _figures(scratch: Path, batch: Batch, together: Combined) -> Section:
     section = Section(title='Figures')
     folders = [result.folder for result in batch.counted]
     decays, long_term = scratch / 'decays.png', scratch / 'long_term.png'
-    if decays_figure(decays, folders, _known(together)):
+    if decays_figure(decays, folders, known_trays(together)):
         section.parts.append(
             Picture(
                 path=decays,
@@ -277,7 +235,7 @@ def _figures(scratch: Path, batch: Batch, together: Combined) -> Section:
 def _cycles(together: Combined) -> list[Section]:
     sections = []
     size, factor = ('length [mm]', _MM) if together.size_unit == 'm' else ('size [beads]', 1.0)
-    for tray in _known(together):
+    for tray in known_trays(together):
         own = [row for row in together.cycles if row.tray == tray.tray]
         table = Table(
             head=('recording', 'cycle', 'start [s]', 'COR', 'walls', "paper's form", 'v0 [mm/s]',
@@ -294,23 +252,16 @@ def _cycle(row: CycleRow, factor: float) -> tuple[str, ...]:
         Path(row.recording).name,
         str(values['cycle']),
         number(values['start'], 4),
-        _interval(values, 'restitution'),
-        _interval(values, 'wall_restitution'),
+        interval_cell(values, 'restitution'),
+        interval_cell(values, 'wall_restitution'),
         number(values['paper_restitution'], 3),
-        _measured(values, 'initial_speed', _MM),
-        _measured(values, 'haff_time'),
-        _measured(values, 'peak_speed', _MM),
-        _measured(values, 'cluster_size', factor),
-        _interval(values, 'sticking_speed', _MM),
+        measured_cell(values, 'initial_speed', _MM),
+        measured_cell(values, 'haff_time'),
+        measured_cell(values, 'peak_speed', _MM),
+        measured_cell(values, 'cluster_size', factor),
+        interval_cell(values, 'sticking_speed', _MM),
         values['status'].replace('_', ' '),
     )
-
-
-def _measured(values: dict[str, Any], name: str, factor: float = 1.0) -> str:
-    value, error = values[name], values.get(f'{name}_error')
-    if value is None:
-        return '–'
-    return with_error(value, math.nan if error is None else error, factor)
 
 
 def _recordings(batch: Batch, settings: PipelineSettings) -> Section:

@@ -65,7 +65,9 @@ def _mixed_settings(results: Sequence[BagResults]) -> list[str]:
     lines = []
     for name in (each for each in EXPERIMENT_SETTINGS if each != _TRAYS):
         key = experiment_key(name)
-        values = Counter(str(result.summary['metadata'].get(key, 'none')) for result in results)
+        values = Counter(
+            str(result.summary['metadata'].get(key, 'not told')) for result in results
+        )
         if len(values) < 2:
             continue
         short = all(len(value) <= _LONGEST for value in values)

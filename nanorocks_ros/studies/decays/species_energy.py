@@ -10,6 +10,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.outputs.figure_style import MARKS, SERIES, plain_numbers
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.physics.paper_formulas import RELATIVE_TO_MEAN_SPEED
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.decays.decay_curve import SpeedCurve
 
 _NANOJOULE, _MM = 1e9, 1e3
-_MAX_GRAY = 255.0
-# Brightness of a line relative to its points.
-_LINE_BRIGHTNESS = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,19 +148,18 @@ def species_values(energies: Sequence[SpeciesEnergy]) -> dict[str, Any]:
 
 def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 0.0) -> None:
     """Draw the energies of both species over time, each with its fit."""
-    for energy, line in zip(energies, ('-', '--'), strict=False):
+    for energy, line, colour, mark in zip(energies, ('-', '--'), SERIES, MARKS, strict=False):
         curve, fit, name = energy.curve, energy.fit, energy.species.material
         scale = relative_energy(1.0, energy.species.bead_mass) * _NANOJOULE
-        colour = np.array(energy.species.properties.color)[::-1] / _MAX_GRAY
         axes.errorbar(
             curve.times,
             scale * curve.speed**2,
             yerr=2.0 * scale * curve.speed * curve.error,
-            fmt='o',
+            fmt=mark,
             ms=2.5,
             lw=0.8,
             alpha=0.5,
-            color=tuple(colour),
+            color=colour,
             label=f'{name}: the speeds do not fall' if fit is None else None,
         )
         if fit is None:
@@ -172,7 +169,7 @@ def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 
             scale * haff_speed(curve.times - origin, fit.initial_speed, fit.haff_time) ** 2,
             line,
             lw=2,
-            color=tuple(_LINE_BRIGHTNESS * colour),
+            color=colour,
             label=f'{name}: {_fit_text(fit)}',
         )
     ratio, error = energy_ratio(energies)
@@ -180,6 +177,7 @@ def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 
     spread = f' ± {error:.2f}' if math.isfinite(error) else ''
     axes.set_title(f'Energy of one {names} bead: {ratio:.2f}{spread}')
     axes.set_yscale('log')
+    plain_numbers(axes.yaxis)
     axes.set_ylabel(r'the same of each species, its own $m$ and $\bar{v}$ [nJ]')
     axes.legend()
     axes.grid(alpha=0.25)

@@ -64,6 +64,8 @@ class CorData:
         Start of the cooling, since the shaking event.
     wall_restitution : float, 0 to 1
         Restitution of the walls in figures that do not vary it.
+    published : tuple of str, optional
+        Lines about what the analysis published, which stand first.
     """
 
     tray: Tray
@@ -72,6 +74,7 @@ class CorData:
     span: tuple[float, float]
     start: float
     wall_restitution: float
+    published: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,6 +186,7 @@ def cor_figures(
             **common,
             species=data.species,
             start=data.start,
+            published=data.published,
         ),
         'instantaneous': _instantaneous(folder / SPEED, data, reports),
     }
@@ -246,7 +250,12 @@ def _instantaneous(path: Path, data: CorData, reports: Reports) -> Instantaneous
     cycles, span = cooling_part(data.cycles, data.span, data.start)
     try:
         return instantaneous_figure(
-            path, data.tray, cycles, wall_restitution=data.wall_restitution, span=span
+            path,
+            data.tray,
+            cycles,
+            wall_restitution=data.wall_restitution,
+            span=span,
+            published=data.published,
         )
     except (ConfigurationError, FitError) as error:
         # The other figures can be drawn without it.

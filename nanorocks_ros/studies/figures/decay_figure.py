@@ -128,11 +128,8 @@ def decay_figure(
 
 def _headline(tray: Tray, cycles: int) -> str:
     beads = ' and '.join(f'{each.count} of {each.material}' for each in tray.species)
-    length, width, height = (1e3 * side for side in tray.dimensions)
-    return (
-        f'Tray {tray.number}, {counted(cycles, "cycle")}; beads: {beads}; '
-        f'{length:g} x {width:g} x {height:g} mm'
-    )
+    sides = ' x '.join(f'{1e3 * side:g}' for side in tray.dimensions if np.isfinite(side))
+    return f'Tray {tray.number}, {counted(cycles, "cycle")}; beads: {beads}; {sides} mm'
 
 
 def _measured_first(axes: Axes) -> tuple[list[Any], list[str]]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.outputs.figure_files import figure_file
-from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TRUTH, TWO_COLUMNS
+from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TRUTH, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.records import NS, CorRelation, CorStatus
+from nanorocks_ros.studies.analysis.published_cycles import Truth, published_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import CorEstimate, GroundTruth, SpeedEstimate
 
 _MM = 1e3
+_COMMAND = 'make demo'
 _NANOJOULE = 1e9
 
 
@@ -45,7 +47,7 @@ def cooling_figure(
     ----------
     Upper panel after [B19] fig. 7.
     """
-    with figure_file(path, TWO_COLUMNS, 150.0) as figure:
+    with figure_file(path, TWO_COLUMNS, 150.0, _COMMAND) as figure:
         energy, convergence = figure.subplots(2, 1, height_ratios=(3, 2), sharex=True)
         start_ns = next(
             speed.cycle_start_ns for speed in speeds if speed.cycle_start_ns is not None
@@ -98,8 +100,11 @@ def _draw_energy(
             rf'$\tau$ = {last.haff_time.value:.2f} s',
         )
     axes.set_yscale('log')
+    plain_numbers(axes.yaxis)
     axes.set_ylabel(r'energy per bead $\frac{1}{2} m \bar{v}^2$ [nJ]')
-    axes.set_title(f'Tray {tray.number}, cycle {last.cycle}: cooling after the shaking event')
+    title = f'Tray {tray.number}, cycle {last.cycle}: cooling after the shaking event'
+    known = Truth(truth[-1].restitution, truth[-1].wall_restitution) if truth else None
+    axes.set_title('\n'.join([title, *published_lines([last], known)]), fontsize=7.5)
     axes.legend()
     axes.grid(alpha=0.25)
 
@@ -117,7 +122,7 @@ def _draw_convergence(
         color=FITTED,
         alpha=0.2,
         lw=0,
-        label='interval (statistics only)' if by_paper else 'interval',
+        label='interval (statistics only)' if by_paper else 'interval of 95 %',
     )
     axes.plot(
         time,
@@ -152,5 +157,5 @@ def _draw_convergence(
 
 
 def _name(last: CorEstimate, by_paper: bool) -> str:
-    source = 'closed form of the paper' if by_paper else 'from simulated decays'
+    source = 'closed form of the paper' if by_paper else 'published'
     return f'{source}: {last.restitution.value:.3f}'

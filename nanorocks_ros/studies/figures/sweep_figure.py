@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.figure_files import figure_file
-from nanorocks_ros.outputs.figure_style import MAP, TWO_COLUMNS
+from nanorocks_ros.outputs.figure_style import MAP, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.settings import SimulationSettings, rows
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
 from nanorocks_ros.studies.decays.sweep_contours import contours
@@ -105,7 +105,8 @@ def chi_square_figure(
             cmap=MAP,
             norm=LogNorm(vmin=_AGREEMENT, vmax=max(float(shown.max()), 2.0)),
         )
-        figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
+        bar = figure.colorbar(mesh, ax=axes, label=r'mean $\chi^2$ over the times', extend='min')
+        plain_numbers(bar.ax.yaxis)
         _draw_contours(axes, sweep, curve)
         _mark(axes, sweep, values, curve)
 

@@ -6,17 +6,14 @@ Tested by ``test/studies/results/test_results_provenance.py``.
 from __future__ import annotations
 
 import platform
-import shlex
-import sys
 from datetime import datetime, timezone
 from functools import cache
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 from nanorocks_ros import __version__
+from nanorocks_ros.outputs.command_line import command_line
 
-_PROGRAM = 'nanorocks'
 _LIBRARIES = 'numpy', 'scipy', 'numba', 'rosbags', 'av', 'pyarrow'
 
 
@@ -27,12 +24,6 @@ def run_provenance() -> dict[str, Any]:
         'command': command_line(),
         'versions': versions(),
     }
-
-
-def command_line() -> str:
-    """The call of the command line as one would type it; empty in a program of somebody else."""
-    name = Path(sys.argv[0]).name if sys.argv else ''
-    return shlex.join([_PROGRAM, *sys.argv[1:]]) if name == _PROGRAM else ''
 
 
 @cache

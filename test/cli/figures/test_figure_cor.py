@@ -133,15 +133,13 @@ def test_a_mixture_shows_each_species_in_its_colour(mixture, tmp_path, capsys):
     assert glass['initial_speed'] > 1.3 * copper['initial_speed']
     assert values['energy_ratio'] + 3.0 * values['energy_ratio_error'] < 1.0
     # Lines of both, in blue, green, red.
-    drawn = np.array(sorted(colours(output)))
-    for line in ((140, 42, 21), (36, 80, 129)):
-        assert np.abs(drawn - line).max(axis=1).min() <= 1
+    assert {(0xB2, 0x72, 0x00), (0x00, 0x5E, 0xD5)} <= colours(output)
 
 
 def test_a_tray_of_one_species_has_no_second_panel(table, tmp_path, capsys):
     assert main(['figure', 'decay', str(table), '-o', str(tmp_path / 'a.png'), '--json']) == 0
     assert json.loads(capsys.readouterr().out)['species'] is None
-    assert cv2.imread(str(tmp_path / 'a.png')).shape[0] < 700
+    assert cv2.imread(str(tmp_path / 'a.png')).shape[0] < 1000
 
 
 def test_the_window_is_that_of_the_analysis(table, tmp_path, capsys):

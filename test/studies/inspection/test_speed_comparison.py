@@ -133,7 +133,7 @@ def test_the_command_draws_one_cycle_and_writes_all_speeds(bag, bag_speeds, tmp_
     drawn = cv2.imread(str(picture))
     colours = {tuple(colour) for colour in drawn.reshape(-1, 3).tolist()}
     # Tracking, structure function, selected speeds.
-    assert {(0x37, 0x78, 0x1B), (0xAC, 0x66, 0x21), (0x11, 0x11, 0x11)} <= colours
+    assert {(0x73, 0x9E, 0x00), (0xB2, 0x72, 0x00), (0, 0, 0)} <= colours
     assert main(call) == 1
     assert 'exists already' in capsys.readouterr().err
 
