@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.film_section import film_section
+from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.interface.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.interface.inputs import named_paths, recording, settings_of, told_settings
 from nanorocks_ros.interface.progress_bars import count_bar
@@ -159,7 +160,7 @@ class _KeptTracks:
     def tracked(self, analysis: Analysis, settings: PipelineSettings) -> TrackedBag:
         """All tracks, by tray."""
         numbers = {stamp: number for number, stamp in enumerate(analysis.stamps_ns)}
-        trays = trays_of(settings)
+        trays, film = trays_of(settings), film_section(settings.trays_file)
         of_trays = {
             tray: [record for record in self._tracks if record.tray == tray] for tray in trays
         }
@@ -172,5 +173,6 @@ class _KeptTracks:
                 tray: [numbers[record.stamp_ns] for record in records]
                 for tray, records in of_trays.items()
             },
-            film=film_section(settings.trays_file),
+            regions={} if film is None else dict.fromkeys(trays, Region(*film.region_px)),
+            film=film,
         )
