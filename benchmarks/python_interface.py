@@ -58,9 +58,9 @@ def report():
         code = '\n'.join([*lines, 'print(film.cor.iloc[0].to_json())'])
         cpu, elapsed, told = cpu_of(code, folder)
         cor = json.loads(told)
-        frames = round((FILM['duration'] + 1.0) * 30)
+        frames = round(30 * FILM['duration'])
         interval = f'[{cor["restitution_lower"]:.3f}, {cor["restitution_upper"]:.3f}]'
         print(
-            f'these lines, about {frames} frames: {elapsed / 60:.2f} min, {cpu:.1f} s of CPU; COR '
+            f'these lines, {frames} frames: {elapsed / 60:.2f} min, {cpu:.1f} s of CPU; COR '
             f'{cor["restitution"]:.3f} {interval}, truth {film.cor["restitution"].item():g}'
         )

@@ -1,4 +1,4 @@
-"""Analyse recordings: `nanorocks_ros.analyse`."""
+"""Analyse recordings, or read results: `nanorocks_ros.analyse` and `nanorocks_ros.read`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.film_section import film_section
+from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.interface.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.interface.inputs import named_paths, recording, settings_of, told_settings
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
+from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
 from nanorocks_ros.studies.analysis.offline_analysis import analyse as analyse_bag
+from nanorocks_ros.studies.analysis.results_reader import read_analysis
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -100,6 +105,47 @@ def analyse(
         return AnalysisResult(analysed, tuple(notices))
 
 
+def read(folder: PathLike) -> AnalysisResult:
+    """Read results that ``nanorocks analyse``, `AnalysisResult.save` or `measure` wrote.
+
+    Parameters
+    ----------
+    folder : path
+        Of one recording, of a batch, or any folder with such folders in it. Of a folder of
+        `measure` it is what the decay of the speeds gave.
+
+    Returns
+    -------
+    AnalysisResult
+        As of `analyse`; ``.combined`` needs what only a batch keeps.
+
+    Raises
+    ------
+    RecordingError
+        When there are no results, or they cannot be read.
+    """
+    with in_python():
+        top = Path(folder).expanduser()
+        if not top.is_dir():
+            raise RecordingError(str(folder), 'is no folder', 'name a folder of results')
+        marks = sorted(top.rglob(RESULTS_MARK), key=lambda mark: natural_key(str(mark)))
+        if not marks:
+            raise RecordingError(
+                str(folder),
+                'holds no results',
+                'name the folder that `nanorocks analyse` or save() wrote',
+            )
+        recordings = []
+        for mark in marks:
+            source, analysis, settings = read_analysis(mark.parent)
+            recordings.append(
+                AnalysedRecording(
+                    name=source, source=mark.parent, settings=settings, analysis=analysis
+                )
+            )
+        return AnalysisResult(recordings, ())
+
+
 class _KeptTracks:
     """Keeps the tracks of an analysis."""
 
@@ -114,7 +160,7 @@ class _KeptTracks:
     def tracked(self, analysis: Analysis, settings: PipelineSettings) -> TrackedBag:
         """All tracks, by tray."""
         numbers = {stamp: number for number, stamp in enumerate(analysis.stamps_ns)}
-        trays = trays_of(settings)
+        trays, film = trays_of(settings), film_section(settings.trays_file)
         of_trays = {
             tray: [record for record in self._tracks if record.tray == tray] for tray in trays
         }
@@ -127,5 +173,6 @@ class _KeptTracks:
                 tray: [numbers[record.stamp_ns] for record in records]
                 for tray, records in of_trays.items()
             },
-            film=film_section(settings.trays_file),
+            regions={} if film is None else dict.fromkeys(trays, Region(*film.region_px)),
+            film=film,
         )

@@ -12,18 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from nanorocks_ros.errors import ConfigurationError, FitError
-from nanorocks_ros.experiment.calibration_file import calibrated
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.interface.combined_cycles import combined_frame
 from nanorocks_ros.interface.contact_frames import contact_frame
 from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import frame_of, joined, table_frame, with_column
 from nanorocks_ros.interface.result import Result, Summary
 from nanorocks_ros.outputs.html_report import with_interval
 from nanorocks_ros.outputs.safe_text import counted
-from nanorocks_ros.pipeline.composition import trays_of
-from nanorocks_ros.records import ONE_SIGMA, CorEstimate, headline_in_words
+from nanorocks_ros.records import CorEstimate, headline_in_words
 from nanorocks_ros.records.result_words import reason_of
-from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.studies.analysis.cycle_words import (
     cycle_as_json,
     tray_reason,
@@ -45,7 +43,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
+    from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
     from nanorocks_ros.records import PairCollision, Rebound
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
@@ -198,14 +196,7 @@ class AnalysisResult(Result):
         return self._joined(cycles)
 
     def _combined(self) -> pd.DataFrame:
-        rows = []
-        for tray, (settings, evidence) in self._evidence().items():
-            wide = _mean_of(settings, tray, evidence)
-            cooling = replace(settings.cooling, probability=ONE_SIGMA)
-            narrow = _mean_of(replace(settings, cooling=cooling), tray, evidence)
-            rows.append(_combined_row(tray, wide, narrow))
-        frame = pd.DataFrame(rows, columns=list(_combined_row(0, None, None)))
-        frame.attrs = {'units': dict.fromkeys(frame.columns, '1')}
+        frame = combined_frame(self._evidence())
         frame.attrs['probability'] = self._probability
         return frame
 
@@ -288,38 +279,3 @@ def _cycle_rows(
         source = headline_in_words(cor.headline, cor.tension, cor.wall_friction)
         rows.append((recording.name, f'{tray}', f'{cor.cycle}', beads, walls, source))
     return rows
-
-
-def _mean_of(
-    settings: PipelineSettings, tray: int, evidence: CycleLikelihoods
-) -> MeanRestitution | None:
-    """The restitutions of all cycles; None where they were read by another method."""
-    own = calibrated(replace(settings, trays=(tray,)))
-    try:
-        return RestitutionEstimator(own, trays_of(own)[tray]).mean_of(evidence)
-    except FitError:
-        return None
-
-
-def _combined_row(
-    tray: int, wide: MeanRestitution | None, narrow: MeanRestitution | None
-) -> dict[str, Any]:
-    """Both restitutions with error and intervals; missing where they are not known."""
-    row: dict[str, Any] = {'tray': tray, 'cycles': None if wide is None else wide.cycles}
-    for name in ('restitution', 'wall_restitution'):
-        value = None if wide is None else getattr(wide, name)
-        inner = None if narrow is None else getattr(narrow, name)
-        row |= {
-            name: getattr(value, 'value', None),
-            f'{name}_error': getattr(value, 'error', None),
-            f'{name}_lower': getattr(value, 'lower', None),
-            f'{name}_upper': getattr(value, 'upper', None),
-            f'{name}_lower_68': getattr(inner, 'lower', None),
-            f'{name}_upper_68': getattr(inner, 'upper', None),
-        }
-    return {
-        **row,
-        'rebounds': None if wide is None else wide.rebounds,
-        'collisions': None if wide is None else wide.collisions,
-        'headline': None if wide is None else wide.headline.name.lower(),
-    }

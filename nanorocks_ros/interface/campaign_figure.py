@@ -43,7 +43,7 @@ def campaign_figure(speeds: pd.DataFrame, cor: pd.DataFrame, combined: pd.DataFr
             _draw_cycles(restitution, cor[cor['tray'] == tray], own)
             decay.set_title(f'tray {tray}')
         rows[-1, 0].set_xlabel('time since the shaking event [s]')
-        rows[-1, 1].set_xlabel('cycle')
+        rows[-1, 1].set_xlabel('cycle, counted over all recordings')
     return figure
 
 
@@ -81,6 +81,6 @@ def _draw_cycles(axes: Axes, cor: pd.DataFrame, together: pd.DataFrame) -> None:
         )
     axes.plot(places, known['restitution'], 'o', color=MEASURED)
     axes.set_ylabel('restitution of beads')
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlim(0.5, max(len(known), 1) + 0.5)
     axes.grid(visible=True)

@@ -40,13 +40,19 @@ after over before; of a rebound it is the restitution of this contact, of collis
 """
 
 
-def contact_frame(contacts: Sequence[Rebound | PairCollision], epoch_ns: int) -> pd.DataFrame:
+def contact_frame(
+    contacts: Sequence[Rebound | PairCollision],
+    epoch_ns: int,
+    corner: tuple[float, float] = (0.0, 0.0),
+) -> pd.DataFrame:
     """A row for each contact, in order of time.
 
     Parameters
     ----------
     contacts : sequence of Rebound or PairCollision
     epoch_ns : int, [ns]
+    corner : tuple of 2 floats, [m]
+        From which places count.
 
     Returns
     -------
@@ -62,6 +68,8 @@ def contact_frame(contacts: Sequence[Rebound | PairCollision], epoch_ns: int) ->
         for contact in ordered
     ]
     frame = pd.DataFrame(rows, columns=list(_UNITS))
+    frame['x'] += corner[0]
+    frame['y'] += corner[1]
     frame['partner'] = frame['partner'].astype('Int64')
     frame.attrs['units'] = dict(_UNITS)
     return frame

@@ -177,7 +177,12 @@ class DescribedFilm(NamedTuple):
 
 
 def described(
-    film: PathLike, told: dict[str, Any], film_told: Mapping[str, Any], *, progress: bool
+    film: PathLike,
+    told: dict[str, Any],
+    film_told: Mapping[str, Any],
+    *,
+    image_topic: str = '',
+    progress: bool,
 ) -> DescribedFilm:
     """A film with the settings that follow from what is told of it.
 
@@ -188,6 +193,7 @@ def described(
         Settings by name.
     film_told : mapping
         As `FilmDescription`.
+    image_topic : str, optional
     progress : bool
 
     Raises
@@ -199,7 +205,8 @@ def described(
     """
     own = recording(film, progress=progress)
     told_film = _told_film(film_told)
-    tray = described_film(told_film, own.bag, '', str(told.get('trays_file', '')))
+    trays_file = str(told.get('trays_file', ''))
+    tray = described_film(told_film, own.bag, image_topic, trays_file)
     notices = own.notices
     if tray is not None:
         told['trays_file'] = tray.text

@@ -83,7 +83,7 @@ class MeasureResult(Result):
         """Cycles, by the decay of the speeds and contacts together; None where not read."""
         if not any(tray.decay_read for tray in self._measured.trays):
             return None
-        from nanorocks_ros.interface.reading import read
+        from nanorocks_ros.interface.analysis import read
 
         return read(self.folder)
 
@@ -105,7 +105,13 @@ class MeasureResult(Result):
         return joined(frames, probability=self._probability)
 
     def _contacts(self, tray: MeasuredTray) -> pd.DataFrame:
-        return contact_frame(tray.contacts.contacts, self._measured.tracked.epoch_ns)
+        tracked = self._measured.tracked
+        x, y = tray.contacts.corner
+        region = tracked.regions.get(tray.number)
+        if tray.unit.name == 'px' and region is not None:
+            # As of the tracks: places in the film.
+            x, y = x + region.x / tray.unit.per_metre, y + region.y / tray.unit.per_metre
+        return contact_frame(tray.contacts.contacts, tracked.epoch_ns, (x, y))
 
     def _tracks(self) -> pd.DataFrame:
         tracked = self._measured.tracked

@@ -75,7 +75,7 @@ def measure(
     """
     with in_python():
         told = told_settings(settings, trays, trays_file)
-        own = described(film, told, description, progress=progress)
+        own = described(film, told, description, image_topic=image_topic, progress=progress)
         if not own.recorded.trays_known:
             raise ConfigurationError(
                 own.recording.name,

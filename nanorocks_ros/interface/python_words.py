@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 _FLAG = re.compile(r'(?<![\w`-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)')
 _COMMAND = re.compile(r'(`[^`]*`)')
 # Of flags that have another name in Python.
-_OTHERS = {'output': 'folder', 'include_inconsistent': 'cooling.include_inconsistent'}
+_OTHERS = {
+    'start': '--start of `nanorocks import`',
+    'output': 'folder',
+    'include_inconsistent': 'cooling.include_inconsistent',
+}
 
 
 def python_words(text: str) -> str:

@@ -72,7 +72,7 @@ def track(
     """
     with in_python():
         told = told_settings(settings, trays, trays_file)
-        own = described(film, told, description, progress=progress)
+        own = described(film, told, description, image_topic=image_topic, progress=progress)
         with count_bar(f'tracking {own.recording.name}', shown=progress) as show:
             tracked = track_bag(
                 own.recording.bag, own.recorded.settings, image_topic=image_topic, progress=show

@@ -45,7 +45,7 @@ _BAR_SHARE = 0.28
 _SHORT, _LONG = 0.35, 3.0
 _FEW, _MANY = (1.0, 2.0, 5.0), (1.0, 2.0, 3.0, 4.0, 5.0, 7.0)
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     'font.family': 'DejaVu Sans',
     'font.size': 8.0,
     'axes.titlesize': 8.5,

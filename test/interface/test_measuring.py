@@ -39,6 +39,16 @@ def test_contacts_of_a_film_give_the_true_restitutions(measured):
     assert measured.decay is None
 
 
+def test_contacts_lie_on_the_tracks(measured):
+    tracks = measured.tracks.set_index(['id', 'frame']).sort_index()
+    rebounds = measured.contacts.query("kind == 'rebound'")
+    for contact in rebounds.itertuples():
+        own = tracks.loc[contact.bead]
+        near = own.iloc[(own['time'] - contact.time).abs().argmin()]
+        assert abs(near['x'] - contact.x) < 4e-4
+        assert abs(near['y'] - contact.y) < 4e-4
+
+
 def test_tracks_and_speeds_are_tables(measured):
     assert measured.tracks['id'].nunique() == 15
     assert measured.speeds['mean_speed'].max() == pytest.approx(6e-3, rel=0.5)

@@ -15,6 +15,7 @@ from nanorocks_ros.interface.python_words import in_python, python_words
         ('raise it: --tracking-max-speed 3', 'raise it: tracking.max_speed 3'),
         ('pass --include-inconsistent', 'pass cooling.include_inconsistent'),
         ('run `nanorocks look BAG --at 3`', 'run `nanorocks look BAG --at 3`'),
+        ('pass --start', 'pass --start of `nanorocks import`'),
         ('a -- b, 1--2', 'a -- b, 1--2'),
         ('lower --prior-min-wall-restitution', 'lower prior.min_wall_restitution'),
     ],

@@ -126,7 +126,10 @@ def _tilts(
     # In a tray as high as a bead all lines of centres are level.
     room[:, 0] = np.where(room.max(axis=1) > 0.0, room[:, 0], 1.0)
     weight = np.maximum(room, 0.0) * np.exp(-0.5 * (square - square.min(axis=1)[:, None]))
-    return tilt, weight / weight.sum(axis=1)[:, None]
+    total = weight.sum(axis=1)[:, None]
+    # Unknown where beads overlap in the picture, but no height is left for one above the other.
+    unknown = np.full_like(weight, np.nan)
+    return tilt, np.divide(weight, total, out=unknown, where=total > 0.0)
 
 
 def horizontal_parts(

@@ -419,7 +419,7 @@ def _determined(
     """The result with the restitutions that the source of the headline determines."""
     restitution, wall_restitution = sources.intervals(ends)
     narrow, narrow_walls = sources.intervals(_NARROW)
-    walls = {
+    walls: dict[str, Any] = {
         'wall_restitution': wall_restitution,
         'wall_restitution_lower_68': narrow_walls.lower,
         'wall_restitution_upper_68': narrow_walls.upper,

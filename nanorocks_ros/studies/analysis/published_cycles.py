@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Interval
 
 _LETTERS = 112
+_NEEDED = 'time', 'cycle', 'status', 'relation', 'restitution', 'headline'
 _ALONE = ('joint', 'decay', 'contact')
 _NAMES = {'joint': 'both together', 'decay': 'decay alone', 'contact': 'contacts alone'}
 _SHOWN_BY = {Headline.JOINT: 'joint', Headline.DECAY: 'decay', Headline.CONTACTS: 'contact'}
@@ -52,15 +53,17 @@ def published_cycles(speeds: Path, tray: int) -> list[CorEstimate]:
     Returns
     -------
     list of CorEstimate
-        In order of time; empty where there is no such table, or of another version.
+        In order of time; empty where there is no such table.
     """
     path = speeds.with_name(speeds.name.replace('_speed.csv', '_cor.csv'))
     if path == speeds or not path.is_file():
         return []
     names = [field.name for field in layout(CorEstimate).fields]
     try:
-        columns = read_columns(path, names)
-        rows = np.column_stack([columns[name] for name in names])
+        # A table of an earlier version lacks what was not known then.
+        columns = read_columns(path, _NEEDED, names)
+        unknown = np.full(len(columns['cycle']), np.nan)
+        rows = np.column_stack([columns.get(name, unknown) for name in names])
         return last_of_each_cycle(
             [from_array(CorEstimate, row, tray=tray, epoch_ns=0, where=str(path)) for row in rows]
         )

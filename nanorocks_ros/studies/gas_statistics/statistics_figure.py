@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _MM, _NANOJOULE = 1e3, 1e9
 _HEIGHT = 195.0
+# Of the decades of an axis, above its data.
+_LEGEND_ROOM = 0.5
 _LEAST_DENSITY, _HIGHEST_DENSITY = 1e-3, 10.0
 # Largest cumulant at which the first Sonine polynomial alone is drawn: beyond, it goes negative.
 _MOST_SONINE = 0.5
@@ -145,6 +147,9 @@ def _collisions(axes: Axes, statistics: TrayStatistics) -> None:
         )
         _draw_wall_hits(axes, statistics, kind, order)
     axes.set_yscale('log')
+    # Room for the legend.
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high * (high / low) ** _LEGEND_ROOM)
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('collisions of a bead [1/s]')
 

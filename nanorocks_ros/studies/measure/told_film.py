@@ -84,12 +84,12 @@ def filmed_tray(told: ToldFilm) -> FilmedTray | None:
 
 
 def _beads(told: ToldFilm, k: int) -> FilmedBeads:
-    def value(values: list[Any] | None) -> Any:
+    def value(values: Sequence[Any] | None) -> Any:
         return None if values is None else values[k]
 
     diameter = value(told.diameter_mm)
     return FilmedBeads(
-        diameter_px=told.diameter_px[k],
+        diameter_px=value(told.diameter_px),
         diameter=None if diameter is None else _MM * diameter,
         count=value(told.count),
         density=value(told.density_g_cm3),
@@ -100,13 +100,17 @@ def _beads(told: ToldFilm, k: int) -> FilmedBeads:
 
 
 def _check(told: ToldFilm) -> None:
-    lists = {
+    lists: dict[str, Sequence[Any] | None] = {
         '--diameter-px': told.diameter_px,
         '--diameter-mm': told.diameter_mm,
         '--count': told.count,
         '--density-g-cm3': told.density_g_cm3,
     }
-    words = {'--look': told.look, '--colour': told.colour, '--material': told.material}
+    words: dict[str, Sequence[Any] | None] = {
+        '--look': told.look,
+        '--colour': told.colour,
+        '--material': told.material,
+    }
     single = [] if told.height_mm is None else [told.height_mm]
     positive = {**lists, '--sides-mm': told.sides_mm, '--height-mm': single}
     for flag, values in positive.items():

@@ -45,6 +45,8 @@ class TrackContacts:
     walls : SeenWalls or None
         Where the walls were found; None where the container is known.
     frames : int
+    corner : tuple of 2 floats, [m]
+        Of the walls, from the corner of the tracks: places of contacts count from it.
     """
 
     contacts: tuple[Rebound | PairCollision, ...]
@@ -52,6 +54,7 @@ class TrackContacts:
     acceleration: SteadyAcceleration
     walls: SeenWalls | None
     frames: int
+    corner: tuple[float, float] = (0.0, 0.0)
 
     @property
     def rebounds(self) -> tuple[Rebound, ...]:
@@ -91,10 +94,10 @@ def track_contacts(
         layer = max(species.diameter_high for species in tray.species)
         tray = replace(tray, dimensions=(*tray.dimensions[:2], layer))
     acceleration = steady_acceleration(tracks)
-    walls = None
+    walls, corner = None, (0.0, 0.0)
     if not container_known:
         walls = seen_walls(tracks, tray, acceleration.correction)
-        tracks, tray = _between(walls, tracks, tray)
+        tracks, tray, corner = _between(walls, tracks, tray)
     drag = Measured(settings.prior.drag, settings.prior.drag_error)
     finder = ContactFinder(tray, drag, acceleration.correction)
     results: list[Rebound | PairCollision | FreeFlight] = []
@@ -115,14 +118,17 @@ def track_contacts(
         acceleration=acceleration,
         walls=walls,
         frames=len(tracks),
+        corner=corner,
     )
 
 
-def _between(walls: SeenWalls, tracks: Sequence[Tracks], tray: Tray) -> tuple[list[Tracks], Tray]:
-    """Tracks and tray with the sides where the walls are; others are out of reach."""
+def _between(
+    walls: SeenWalls, tracks: Sequence[Tracks], tray: Tray
+) -> tuple[list[Tracks], Tray, tuple[float, float]]:
+    """Tracks and tray with the sides where the walls are, and their corner; others are far."""
     filled = [record.positions for record in tracks if record.ids.size]
     if not filled:
-        return list(tracks), tray
+        return list(tracks), tray, (0.0, 0.0)
     places = np.concatenate(filled)
     far = _BEYOND * tray.diameter
     outside = [
@@ -135,4 +141,4 @@ def _between(walls: SeenWalls, tracks: Sequence[Tracks], tray: Tray) -> tuple[li
     )
     corner = np.array([x0, y0])
     moved = [replace(record, positions=record.positions - corner) for record in tracks]
-    return moved, replace(tray, dimensions=(x1 - x0, y1 - y0, tray.dimensions[2]))
+    return moved, replace(tray, dimensions=(x1 - x0, y1 - y0, tray.dimensions[2])), (x0, y0)

@@ -6,9 +6,12 @@ Tested by ``test/interface/test_python_page.py``.
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import nanorocks_ros
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _HEAD = """# The public Python interface
 
@@ -20,9 +23,13 @@ names are stable: a change is announced one release before, and the old name wor
 
 def python_page() -> str:
     """Functions with their keywords, results with their tables, exceptions."""
-    public = {name: getattr(nanorocks_ros, name) for name in nanorocks_ros.__all__}
-    functions = {name: value for name, value in public.items() if inspect.isfunction(value)}
-    classes = {name: value for name, value in public.items() if inspect.isclass(value)}
+    public: dict[str, Any] = {name: getattr(nanorocks_ros, name) for name in nanorocks_ros.__all__}
+    functions: dict[str, Any] = {
+        name: value for name, value in public.items() if inspect.isfunction(value)
+    }
+    classes: dict[str, Any] = {
+        name: value for name, value in public.items() if inspect.isclass(value)
+    }
     errors = {name: value for name, value in classes.items() if issubclass(value, Exception)}
     text = _HEAD + _table(
         ('function', 'what it does', 'result'),
@@ -99,7 +106,7 @@ def _attributes(kind: Any) -> list[tuple[str, str]]:
     return rows
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     lines = [f'| {" | ".join(head)} |', '| ' + ' | '.join('---' for _ in head) + ' |']
     lines += ['| ' + ' | '.join(cell.replace('|', '\\|') for cell in row) + ' |' for row in rows]
     return '\n'.join(lines) + '\n\n'

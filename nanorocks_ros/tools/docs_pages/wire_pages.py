@@ -22,7 +22,7 @@ from nanorocks_ros.wire.layout_fields import array_elements
 from nanorocks_ros.wire.products import PRODUCTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
 _NOTE = '<!-- Made by `make docs` from the code; change that instead. -->\n\n'
 _GROUPS = (
@@ -193,7 +193,7 @@ def _range(row: st.SettingRow) -> str:
     return f'{row.bounds.low:g} to {row.bounds.high:g}'
 
 
-FILES = {
+FILES: dict[str, Callable[[], str]] = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
     'docs/reference/flags.md': flags_page,

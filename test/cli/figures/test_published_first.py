@@ -160,3 +160,13 @@ def test_another_tray_than_that_of_the_results_is_refused(own, tmp_path, capsys)
     same = tmp_path / 'same.yaml'
     same.write_text(STEEL)
     assert main([*call, '--trays', str(same)]) == 0
+
+
+def test_a_table_without_the_columns_of_this_version_is_told_as_well(own, capsys):
+    path = own / 'tray_1_cor.csv'
+    rows = [line.split(',') for line in path.read_text().splitlines()]
+    kept = [k for k, name in enumerate(rows[0]) if '_68' not in name]
+    assert len(kept) < len(rows[0])
+    path.write_text('\n'.join(','.join(row[k] for k in kept) for row in rows) + '\n')
+    values, _ = drawn(own, capsys)
+    assert values['published'][0].startswith('analyse: beads 0.8480 [0.8360, 0.8600]')
