@@ -35,7 +35,7 @@ def test_without_options_all_is_guessed_and_said(film, tmp_path, capsys):
     assert species.expected == 10
     for part in ('the diameter is guessed: 2', 'no length is told', 'guessed: 10'):
         assert part in printed.err
-    assert f'nanorocks measure {film} --tray {output}' in printed.out
+    assert f'nanorocks measure {film} --trays-file {output}' in printed.out
 
 
 def test_options_are_written_as_told_and_the_picture_shows_it(film, tmp_path, capsys):
