@@ -1,7 +1,7 @@
 """Decoding of compressed images: JPEG by libjpeg-turbo itself where it is installed.
 
-The wheels of OpenCV take twice as long for a JPEG as `simplejpeg` does, which links the same
-library and gives the same pixels. It is optional: ROS distributions do not package it. Whatever it
+The wheels of OpenCV take longer for a JPEG than `simplejpeg` does (by 15 % and more), which links
+the same library and gives the same pixels. It is optional: ROS distributions do not package it. Whatever it
 does not read without a warning (broken and CMYK images, other formats), OpenCV decodes.
 
 Tested by ``test/recordings/test_image_decoding.py``.
