@@ -40,7 +40,7 @@ def _author(author: dict[str, Any]) -> str:
 
 def _fields(work: dict[str, Any]) -> dict[str, str]:
     """What is known of a work, by the names of BibTeX."""
-    named = {
+    named: dict[str, str] = {
         name: str(work[name])
         for name in ('title', 'journal', 'version', 'doi', 'url', 'year')
         if name in work
