@@ -1,8 +1,9 @@
 """Decoding of compressed images: JPEG by libjpeg-turbo itself where it is installed.
 
 The wheels of OpenCV take longer for a JPEG than `simplejpeg` does (by 15 % and more), which links
-the same library and gives the same pixels. It is optional: ROS distributions do not package it. Whatever it
-does not read without a warning (broken and CMYK images, other formats), OpenCV decodes.
+the same library and gives the same pixels. It is optional: ROS distributions do not package it.
+Whatever it does not read without a warning (broken and CMYK images, other formats), OpenCV
+decodes.
 
 Tested by ``test/recordings/test_image_decoding.py``.
 """
