@@ -1,4 +1,7 @@
-"""The look of reports: on a phone, on a screen, bright or dark, and on paper with page numbers."""
+"""The look of reports: on a phone, on a screen, bright or dark, and on paper with page numbers.
+
+Tested by ``test/outputs/test_html_report.py``.
+"""
 
 from __future__ import annotations
 
