@@ -34,6 +34,7 @@ ALL = (
     'ranks',
     'contacts_alone',
     'own_tray',
+    'python_interface',
     'radii',
     'speed_trays',
     'speed_grains',

@@ -6,20 +6,17 @@ Tested by ``test/studies/analysis/test_offline_analysis.py``.
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError
-from nanorocks_ros.records import CorRelation
-from nanorocks_ros.settings import priors_in_words
 
 if TYPE_CHECKING:
     import argparse
 
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
+    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
 _EPILOG = """\
 Several bags, a pattern or a folder of bags are a batch. It uses one worker for each core, and the
@@ -141,51 +138,11 @@ def _scratch_folder() -> Path | None:
 
 
 def _print(analysis: Analysis) -> None:
+    from nanorocks_ros.studies.analysis.tray_words import tray_lines
+
     lost = f', {analysis.frames_lost} lost' if analysis.frames_lost else ''
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')
     for number, results in analysis.trays.items():
         print(f'tray {number}: {len(results.speeds)} speeds')
         for line in tray_lines(analysis, results):
             print(f'  {line}')
-
-
-def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
-    """The cycles of a tray in lines of text."""
-    from nanorocks_ros.studies.analysis.cycle_words import (
-        cycle_lines,
-        is_decay_left_out,
-        tray_reason,
-        used_speeds,
-        wall_prior,
-    )
-    from nanorocks_ros.studies.analysis.results_json import (
-        end_of_cycle,
-        ends_of_cycles,
-        last_of_each_cycle,
-    )
-
-    recognised = [line for verdict in results.verdicts for line in verdict.lines()]
-    reason = tray_reason(results)
-    if reason is not None:
-        return [*recognised, f'no COR: {reason.text}; {reason.remedy}']
-    cycles = last_of_each_cycle(results.cors)
-    used = used_speeds(results.speeds, cycles, wall_prior(analysis.prior))
-    ends = ends_of_cycles(results.clusters)
-    lines = [*recognised, f'priors: {priors_in_words(analysis.prior)}']
-    left_out = 0
-    for cor in cycles:
-        is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)
-        left_out += is_out
-        lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
-    mean = cycles[-1].mean_restitution
-    if len(cycles) > 1 and math.isfinite(mean.value):
-        without = f', without the decays of {left_out}' if left_out else ''
-        lines.append(f'all cycles: COR {mean.value:.4f} +- {mean.error:.4f}{without}')
-    if results.truth:
-        truth = results.truth[-1]
-        lines.append(f'truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
-    if cycles[-1].relation is CorRelation.PAPER:
-        lines.append(
-            "relation 'paper': its interval is statistical only, see docs/method/physics.md"
-        )
-    return lines

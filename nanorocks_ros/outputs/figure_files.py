@@ -25,14 +25,15 @@ PICTURES = ('.png', '.pdf', '.svg')
 
 @contextmanager
 def figure_file(
-    path: Path, width: float, height: float, command: str | None = None
+    path: Path | None, width: float, height: float, command: str | None = None
 ) -> Iterator[Figure]:
     """An empty figure to draw on, which is written when the block ends.
 
     Parameters
     ----------
-    path : Path
+    path : Path or None
         ``.png`` (200 dpi), ``.pdf`` or ``.svg`` (with their fonts); a file there is replaced.
+        None: the figure is drawn and not written.
     width, height : float, [mm]
     command : str, optional
         Written into the file with the version; by default that of this process.
@@ -49,17 +50,18 @@ def figure_file(
     RecordingError
         When the file cannot be written.
     """
-    check_picture(path)
+    if path is not None:
+        check_picture(path)
     import matplotlib as mpl
+    from matplotlib.figure import Figure
 
     from nanorocks_ros.outputs.figure_style import STYLE, inches
-
-    mpl.use('Agg')
-    from matplotlib.figure import Figure
 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=inches(width, height), layout='constrained')
         yield figure
+        if path is None:
+            return
         told = command or command_line() or program_name()
         with atomic_file(path) as part:
             figure.savefig(part, metadata=_metadata(path.suffix, told))

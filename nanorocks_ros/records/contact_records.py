@@ -142,6 +142,13 @@ class PairCollision:
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
+    @property
+    def normal_speeds(self) -> tuple[float, float]:
+        """Speeds of approach and of parting along the projected line of centres, [m/s]."""
+        normal = self.separation / np.hypot(*self.separation)
+        before, after = self.before[1] - self.before[0], self.after[1] - self.after[0]
+        return -float(before @ normal), float(after @ normal)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeFlight:

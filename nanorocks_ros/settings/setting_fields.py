@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from nanorocks_ros.errors import ConfigurationError
@@ -201,7 +202,7 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
     for message in messages:
         warnings.warn(message, FutureWarning, stacklevel=2)
     known = {row.name: row for row in rows(settings)}
-    problems = [f'no setting {name!r}' for name in values if name not in known]
+    problems = [_no_setting(name, known) for name in values if name not in known]
     for name, value in values.items():
         text = problem(known[name], value) if name in known else None
         if text:
@@ -214,6 +215,15 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
         settings, {name: coerced(known[name], value) for name, value in values.items()}
     )
     return changed
+
+
+def _no_setting(name: str, known: Mapping[str, SettingRow]) -> str:
+    """That there is no such setting, and which one may be meant."""
+    # The group may be left out.
+    by_last = {other.rpartition('.')[2]: other for other in known}
+    near = get_close_matches(name, [*known, *by_last], n=1)
+    meant = f'; did you mean {by_last.get(near[0], near[0])!r}?' if near else ''
+    return f'no setting {name!r}{meant}'
 
 
 def _replaced(settings: Any, values: Mapping[str, Value]) -> Any:

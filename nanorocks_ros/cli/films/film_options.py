@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.appearance import AUTO
-
 if TYPE_CHECKING:
-    from nanorocks_ros.studies.measure.film_tray import FilmedBeads, FilmedTray
-
-_MM = 1e-3
+    from pathlib import Path
 
 
 def add_film_options(parser: argparse.ArgumentParser) -> None:
@@ -66,18 +59,12 @@ def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...
     RecordingError
         When the recording cannot be read.
     """
-    from nanorocks_ros.studies.measure.film_samples import film_samples
-    from nanorocks_ros.studies.measure.film_tray import described_tray
+    from nanorocks_ros.studies.measure.told_film import described_film
 
-    filmed = filmed_tray(options)
-    if filmed is None:
+    film: Any = options
+    tray = described_film(film, bag, options.image_topic, options.trays_file)
+    if tray is None:
         return ()
-    if options.trays_file:
-        raise ConfigurationError(
-            '--diameter-px', 'and --trays-file both describe the beads', 'leave out one of them'
-        )
-    samples = film_samples(bag, options.image_topic)
-    tray = described_tray(filmed, samples.size)
     options.trays_file = tray.text
     return tray.notices
 
@@ -86,78 +73,3 @@ def print_notices(notices: tuple[str, ...]) -> None:
     """Print notices for the user, one line each."""
     for notice in notices:
         print(f'nanorocks: {notice}', file=sys.stderr)
-
-
-def filmed_tray(options: argparse.Namespace) -> FilmedTray | None:
-    """What the options say of the film; None without a diameter in pixels.
-
-    Raises
-    ------
-    ConfigurationError
-        For lists of different lengths, and numbers that cannot be.
-    """
-    from nanorocks_ros.studies.measure.film_tray import FilmedTray
-
-    _check(options)
-    if not options.diameter_px:
-        return None
-    sides = options.sides_mm
-    pairs = options.corners or []
-    return FilmedTray(
-        beads=tuple(_beads(options, k) for k in range(len(options.diameter_px))),
-        corners_px=tuple(zip(pairs[::2], pairs[1::2], strict=True)),
-        sides=None if sides is None else (_MM * sides[0], _MM * sides[1]),
-        height=None if options.height_mm is None else _MM * options.height_mm,
-    )
-
-
-def _beads(options: argparse.Namespace, k: int) -> FilmedBeads:
-    from nanorocks_ros.studies.measure.film_tray import FilmedBeads
-
-    def value(values: list[Any] | None) -> Any:
-        return None if values is None else values[k]
-
-    diameter = value(options.diameter_mm)
-    return FilmedBeads(
-        diameter_px=options.diameter_px[k],
-        diameter=None if diameter is None else _MM * diameter,
-        count=value(options.count),
-        density=value(options.density_g_cm3),
-        look=value(options.look) or AUTO,
-        colour=value(options.colour) or AUTO,
-    )
-
-
-def _check(options: argparse.Namespace) -> None:
-    lists = {
-        '--diameter-px': options.diameter_px,
-        '--diameter-mm': options.diameter_mm,
-        '--count': options.count,
-        '--density-g-cm3': options.density_g_cm3,
-    }
-    words = {'--look': options.look, '--colour': options.colour}
-    single = [] if options.height_mm is None else [options.height_mm]
-    positive = {**lists, '--sides-mm': options.sides_mm, '--height-mm': single}
-    for flag, values in positive.items():
-        for value in values or []:
-            if not (math.isfinite(value) and value > 0):
-                raise ConfigurationError(flag, f'{value:g}', 'give numbers above 0')
-    given = {flag: values for flag, values in (lists | words).items() if values is not None}
-    others = {'--corners': options.corners, '--sides-mm': options.sides_mm, '--height-mm': single}
-    if not options.diameter_px:
-        for flag, values in {**given, **others}.items():
-            if values:
-                raise ConfigurationError(
-                    flag, 'needs --diameter-px', 'add the diameter of a bead in the picture'
-                )
-    for flag, values in given.items():
-        if options.diameter_px and len(values) != len(options.diameter_px):
-            raise ConfigurationError(
-                flag,
-                f'{len(values)} values for {len(options.diameter_px)} of --diameter-px',
-                'give one for each species',
-            )
-    if options.corners and len(options.corners) not in (4, 8):
-        raise ConfigurationError(
-            '--corners', f'{len(options.corners)} numbers', 'give two corners or four: X Y X Y'
-        )

@@ -120,6 +120,6 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
 
 
 def _described(analysis: Analysis, number: int) -> list[str]:
-    from nanorocks_ros.cli.analyse import tray_lines
+    from nanorocks_ros.studies.analysis.tray_words import tray_lines
 
     return tray_lines(analysis, analysis.trays[number])

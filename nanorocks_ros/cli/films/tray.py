@@ -64,17 +64,19 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Describe, recognise, write, and return the exit code."""
-    from nanorocks_ros.cli.films.film_options import filmed_tray, print_notices
+    from nanorocks_ros.cli.films.film_options import print_notices
     from nanorocks_ros.outputs.atomic_files import write_bytes
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.measure.film_samples import film_samples
     from nanorocks_ros.studies.measure.film_tray import described_tray
     from nanorocks_ros.studies.measure.seen_beads import seen_beads
+    from nanorocks_ros.studies.measure.told_film import filmed_tray
 
     _check_outputs(options)
     samples = film_samples(Path(options.bag), options.image_topic, whole=True)
     guesses = _complete(options, samples)
-    filmed = filmed_tray(options)
+    told: Any = options
+    filmed = filmed_tray(told)
     assert filmed is not None
     if options.bead and len(options.bead) > 1 and not options.colour:
         filmed = _coloured(filmed, options.bead, samples)

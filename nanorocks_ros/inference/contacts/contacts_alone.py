@@ -133,7 +133,7 @@ def contacts_alone(
         beads=_restitution(
             pair_table(collisions, _GRID[::10]),
             collisions,
-            [_approach(pair) for pair in collisions],
+            [pair.normal_speeds[0] for pair in collisions],
             (slowing, prior.collision_bias, probability),
         ),
         walls=walls(rebounds),
@@ -148,12 +148,6 @@ def contacts_alone(
 def _complete(contact: Rebound | PairCollision) -> Rebound | PairCollision:
     """The contact; without friction beside it where no speed is known of that time."""
     return contact if contact.friction_length >= 0.0 else replace(contact, friction_length=0.0)
-
-
-def _approach(pair: PairCollision) -> float:
-    """Speed along the projected line of centres, [m/s]."""
-    normal = pair.separation / np.hypot(*pair.separation)
-    return -float((pair.before[1] - pair.before[0]) @ normal)
 
 
 def _restitution(

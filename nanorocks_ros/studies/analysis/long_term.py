@@ -169,7 +169,7 @@ def write_campaign(campaign: Campaign, path: Path) -> None:
     RecordingError
         When it cannot be written.
     """
-    columns = _campaign_columns(campaign.measure)
+    columns = campaign_columns(campaign.measure)
     rows = [
         [
             *(getattr(cycle, column.name) for column in columns[:-1]),
@@ -180,7 +180,8 @@ def write_campaign(campaign: Campaign, path: Path) -> None:
     write_rows(path, columns, rows, run_provenance())
 
 
-def _campaign_columns(measure: SizeMeasure) -> tuple[Column, ...]:
+def campaign_columns(measure: SizeMeasure) -> tuple[Column, ...]:
+    """Columns of the table of a campaign, a row for each cycle of each tray."""
     of_cor = {column.name: column for column in columns_of(CorEstimate)}
     return (
         Column(name='recording', kind='string', doc='name of the folder of results'),

@@ -118,8 +118,8 @@ def write_results(
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
             _write_tables(analysis, fresh, source, settings, form)
-            provenance = _bag_provenance(source, settings) | _truth(analysis)
-            _write_bag(analysis, fresh / BAG_NAME, provenance)
+            carried = _bag_provenance(source, settings) | _truth(analysis)
+            _write_bag(analysis, fresh / BAG_NAME, carried)
             if more is not None:
                 more(fresh)
             if folder.exists():

@@ -87,13 +87,14 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     RecordingError
         When the file cannot be written.
     """
-    pieces = _pieces(tracked)
+    pieces = track_pieces(tracked)
     if path.suffix == '.csv':
         pieces = (_rounded(piece) for piece in pieces)
     write_table(path, columns_of(tracked), pieces, _provenance(tracked))
 
 
-def _pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+def track_pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:
+    """The rows of the table, by column, frame by frame."""
     for number in tracked.trays:
         frames = zip(tracked.tracks[number], tracked.numbers[number], strict=True)
         for tracks, frame in frames:

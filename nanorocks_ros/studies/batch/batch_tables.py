@@ -99,7 +99,7 @@ def write_tables(
     ]
     names = tuple(dict.fromkeys(key for row in trays for key in row))
     tables = {
-        f'{CYCLES}.{kind}': (_cycle_columns(combined.size_unit), cycles),
+        f'{CYCLES}.{kind}': (cycle_columns(combined.size_unit), cycles),
         f'{TRAYS}.{kind}': (
             tuple(_mean_column(name, combined.size_unit) for name in names) or (_TRAY,),
             trays,
@@ -125,7 +125,8 @@ def _tray_in_words(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _cycle_columns(size_unit: str) -> tuple[Column, ...]:
+def cycle_columns(size_unit: str) -> tuple[Column, ...]:
+    """Columns of the table of cycles; cluster sizes in beads, ``1``, or lengths, ``m``."""
     return (
         _RECORDING,
         _TRAY,

@@ -79,7 +79,7 @@ def cached_import(film: Path, progress: Callable[[float], None]) -> CachedFilm:
         If the film cannot be read, or no cache folder can be written.
     """
     state = _state(film)
-    folder = _cache_folder(film)
+    folder = cache_folder(film)
     bag, record = folder / film.resolve().name, folder / f'{film.resolve().name}.json'
     known = _read(record)
     if known.get('film') == state and bag.is_dir():
@@ -117,7 +117,7 @@ def _read(record: Path) -> dict[str, object]:
     return content if isinstance(content, dict) else {}
 
 
-def _cache_folder(film: Path) -> Path:
+def cache_folder(film: Path) -> Path:
     """Folder for the import: beside the film, or in the cache of the user."""
     beside = film.resolve().parent / CACHE
     home = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache')

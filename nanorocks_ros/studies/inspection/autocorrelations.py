@@ -45,7 +45,7 @@ _ESTIMATED = (
     'size_status',
 )
 _OF_CLUSTERS = {column.name: column for column in columns_of(ClusterEstimate)}
-_COLUMNS = (
+COLUMNS = (
     Column(name='tray', kind='int64', unit='1', doc='number of the tray'),
     _OF_CLUSTERS['time'],
     Column(name='since_shaking', unit='s', doc='time since the shaking event'),
@@ -274,7 +274,7 @@ def write_clusters(path: Path, clusters: BagClusters) -> None:
         If the file cannot be written.
     """
     provenance = {**run_provenance(), 'epoch_ns': clusters.epoch_ns}
-    write_rows(path, _COLUMNS, _rows(clusters), provenance)
+    write_rows(path, COLUMNS, _rows(clusters), provenance)
 
 
 def _rows(clusters: BagClusters) -> Iterator[tuple[object, ...]]:

@@ -32,7 +32,7 @@ METHODS = 'tracking', 'structure_function', 'binarised_area'
 """The compared methods; `auto` is the one of them that is selected from the data."""
 
 _OF_SPEED = {column.name: column for column in columns_of(SpeedEstimate)}
-_COLUMNS = (
+COLUMNS = (
     Column(name='tray', kind='int64', unit='1', doc='number of the tray'),
     Column(name='method', kind='string', doc='method that was set', words=(AUTO, *METHODS)),
     _OF_SPEED['time'],
@@ -201,7 +201,7 @@ def write_speeds(path: Path, bag_speeds: BagSpeeds) -> None:
         If the file cannot be written.
     """
     provenance = {**run_provenance(), 'epoch_ns': bag_speeds.epoch_ns}
-    write_rows(path, _COLUMNS, _rows(bag_speeds), provenance)
+    write_rows(path, COLUMNS, _rows(bag_speeds), provenance)
 
 
 def _rows(bag_speeds: BagSpeeds) -> Iterator[tuple[object, ...]]:

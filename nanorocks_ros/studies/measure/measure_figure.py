@@ -17,23 +17,23 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from nanorocks_ros.records import PairCollision
     from nanorocks_ros.studies.measure.measured_words import LengthUnit
     from nanorocks_ros.studies.measure.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
 
 
 def measure_figure(
-    path: Path, speeds: TrackSpeeds, contacts: TrackContacts, unit: LengthUnit
-) -> None:
+    path: Path | None, speeds: TrackSpeeds, contacts: TrackContacts, unit: LengthUnit
+) -> Figure:
     """Draw the speeds, and both kinds of contacts.
 
     Parameters
     ----------
-    path : Path
-        Picture to write.
+    path : Path or None
+        Picture to write; None: none.
     speeds : TrackSpeeds
     contacts : TrackContacts
     unit : LengthUnit
@@ -51,20 +51,14 @@ def measure_figure(
         time.plot(speeds.time, unit.per_metre * speeds.mean, color=MEASURED, label='mean')
         time.set(xlabel='time [s]', ylabel=f'speed of the beads [{unit.name}/s]', ylim=(0.0, None))
         time.legend()
-        collided = np.array([_normal_speeds(pair) for pair in contacts.collisions]).reshape(-1, 2)
+        collided = np.array([pair.normal_speeds for pair in contacts.collisions]).reshape(-1, 2)
         rebounded = np.array(
             [(rebound.incoming.value, rebound.outgoing.value) for rebound in contacts.rebounds]
         ).reshape(-1, 2)
         alone = contacts.alone
         _scatter(pairs, collided, alone.beads.restitution.value, 'collisions of two beads', unit)
         _scatter(walls, rebounded, alone.walls.restitution.value, 'rebounds from walls', unit)
-
-
-def _normal_speeds(pair: PairCollision) -> tuple[float, float]:
-    """Speeds of approach and of parting along the projected line of centres, [m/s]."""
-    normal = pair.separation / np.hypot(*pair.separation)
-    before, after = pair.before[1] - pair.before[0], pair.after[1] - pair.after[0]
-    return -float(before @ normal), float(after @ normal)
+    return figure
 
 
 def _scatter(

@@ -17,7 +17,11 @@ from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
 from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
-from nanorocks_ros.studies.measure.measure_report import MeasuredTray, write_measure_report
+from nanorocks_ros.studies.measure.measure_report import (
+    DECAY_NOT_READ,
+    MeasuredTray,
+    write_measure_report,
+)
 from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
@@ -92,11 +96,14 @@ class Measured:
     usable : bool
         Whether the beads were recognised well enough.
     report : Path
+    tracked : TrackedBag
+        The tracks; without pictures where they are those of an earlier run.
     """
 
     trays: tuple[MeasuredTray, ...]
     usable: bool
     report: Path
+    tracked: TrackedBag
 
 
 def check_measure_folder(folder: Path) -> None:
@@ -141,7 +148,7 @@ def measure_film(plan: MeasurePlan, teller: Teller) -> Measured:
     content = {'film': plan.name, 'usable': tracked.usable, 'trays': values}
     write_bytes(plan.folder / MARK, (json.dumps(content, indent=1) + '\n').encode())
     write_measure_report(report, plan.name, tracked, trays, plan.folder / _PICTURE)
-    return Measured(trays=trays, usable=tracked.usable, report=report)
+    return Measured(trays=trays, usable=tracked.usable, report=report, tracked=tracked)
 
 
 def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
@@ -230,7 +237,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     """What the decay of the speeds says, or why it is not read."""
     reason = step.reason_against
     if reason:
-        return [f'decay: not read; {reason}']
+        return [f'{DECAY_NOT_READ}; {reason}']
     number = step.tray.number
     key = tracking_key(plan.bag, plan.settings, plan.image_topic)
     note = plan.folder / f'tray_{number}_decay.json'
@@ -243,7 +250,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     except RecordingError:
         raise
     except NanorocksError as error:
-        return [f'decay: not read; {error}']
+        return [f'{DECAY_NOT_READ}; {error}']
     said = {line for verdict in step.verdicts for line in verdict.lines()}
     lines = [
         f'decay: {line.strip()}'

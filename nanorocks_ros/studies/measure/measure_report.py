@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.measure.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
 
+DECAY_NOT_READ = 'decay: not read'
+"""How the line begins that says why the decay is not read."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredTray:
@@ -52,6 +55,11 @@ class MeasuredTray:
     recognition: tuple[str, ...]
     lines: tuple[str, ...]
     decay: tuple[str, ...]
+
+    @property
+    def decay_read(self) -> bool:
+        """Whether there are results of the decay, in the folder of the tray."""
+        return bool(self.decay) and not self.decay[0].startswith(DECAY_NOT_READ)
 
     def as_json(self) -> dict[str, Any]:
         """Numbers in s and m, or px where no length is known; None where unknown; all lines."""

@@ -27,7 +27,7 @@ _BINS = 200
 _LEAST_FRAMES = 3
 # Part of the film at each end whose speeds are told.
 _END = 0.05
-_COLUMNS = (
+COLUMNS = (
     Column(name='time', unit='s', doc='middle of the bin, since the first frame'),
     Column(name='mean_speed', unit='m/s', doc='mean projected speed of the beads'),
     Column(name='rms_speed', unit='m/s', doc='root mean square of the projected speed'),
@@ -89,4 +89,4 @@ def write_speeds(path: Path, speeds: TrackSpeeds) -> None:
         When it cannot be written.
     """
     rows = np.column_stack(speeds).tolist()
-    write_rows(path, _COLUMNS, rows, run_provenance())
+    write_rows(path, COLUMNS, rows, run_provenance())

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
@@ -32,12 +33,13 @@ _DECAY_HEIGHT = 72.0
 _FLOOR = '#e9ecef'
 
 
-def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
+def simulated_figure(path: Path | None, simulated: SimulatedRuns) -> Figure:
     """Draw the beads of the first run from above, coloured by speed, and the decay of all runs.
 
     Parameters
     ----------
-    path : Path
+    path : Path or None
+        None: the figure is not written.
     simulated : SimulatedRuns
         Of a plan that keeps the first run at `shown_times`, or the trajectory.
 
@@ -60,6 +62,7 @@ def simulated_figure(path: Path, simulated: SimulatedRuns) -> None:
         trays = panels[0].subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         _draw_trays(trays, simulated, shown_indices)
         _draw_decay(panels[1].subplots(), simulated, shown_indices)
+    return figure
 
 
 def _draw_trays(

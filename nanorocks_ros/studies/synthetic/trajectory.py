@@ -13,18 +13,20 @@ from nanorocks_ros.outputs.table_columns import Column
 from nanorocks_ros.simulation.initial_state import inventory
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from nanorocks_ros.studies.synthetic.simulated_result import SimulatedRun, SimulatedRuns
 
+    Table = tuple[tuple[Column, ...], Iterator[dict[str, NDArray[Any]]]]
+
 TABLES = '.npz', '.parquet'
 """Suffixes of these files."""
 
 _AXES = 'xyz'
-_EVENT_COLUMNS = (
+EVENT_COLUMNS = (
     Column(name='run', kind='int32', unit='1', doc='number of the run'),
     Column(name='time', unit='s', doc='since the shaking event'),
     Column(name='type', kind='string', doc='pair, wall, merge or fix'),
@@ -63,8 +65,7 @@ def write_trajectory(path: Path, simulated: SimulatedRuns) -> None:
         When the file cannot be written.
     """
     if path.suffix == '.parquet':
-        pieces = (_bead_rows(simulated, run) for run in simulated.runs)
-        write_parquet(path, _bead_columns(simulated), pieces, simulated.provenance())
+        write_parquet(path, *trajectory_table(simulated), simulated.provenance())
     else:
         _write_arrays(path, _bead_arrays(simulated))
 
@@ -88,23 +89,34 @@ def write_events(path: Path, simulated: SimulatedRuns) -> None:
     RecordingError
         When the file cannot be written.
     """
-    pieces = (_event_rows(run) for run in simulated.runs)
+    columns, pieces = event_table(simulated)
     if path.suffix == '.parquet':
-        write_parquet(path, _EVENT_COLUMNS, pieces, simulated.provenance())
+        write_parquet(path, columns, pieces, simulated.provenance())
         return
     rows = list(pieces)
 
     def joined(name: str) -> Callable[[], Any]:
         return lambda: np.concatenate([row[name] for row in rows])
 
-    arrays = {column.name: joined(column.name) for column in _EVENT_COLUMNS}
+    arrays = {column.name: joined(column.name) for column in columns}
     _write_arrays(path, {**arrays, 'provenance': lambda: np.array(simulated.provenance())})
+
+
+def trajectory_table(simulated: SimulatedRuns) -> Table:
+    """Columns and rows of the beads of every run at every time, run by run."""
+    pieces = (_bead_rows(simulated, run) for run in simulated.runs)
+    return _bead_columns(simulated), pieces
+
+
+def event_table(simulated: SimulatedRuns) -> Table:
+    """Columns and rows of every collision of every run, run by run."""
+    return EVENT_COLUMNS, (_event_rows(run) for run in simulated.runs)
 
 
 def _event_rows(run: SimulatedRun) -> dict[str, NDArray[Any]]:
     columns = {
         column.name: run.events[_FIELDS.get(column.name, column.name)]
-        for column in _EVENT_COLUMNS[1:]
+        for column in EVENT_COLUMNS[1:]
     }
     return {'run': np.full(len(run.events), run.number, dtype=np.int32), **columns}
 

@@ -1,4 +1,4 @@
-"""Pages of the documentation that are generated: topics, array layouts, parameters, flags.
+"""Pages of the documentation that are generated: topics, tables, parameters, flags, Python.
 
 ``python -m nanorocks_ros.tools.docs_pages.wire_pages`` writes them; a test fails when they are
 stale.
@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 from nanorocks_ros import settings as st
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import FLAGS
+from nanorocks_ros.tools.docs_pages.python_page import python_page
+from nanorocks_ros.tools.docs_pages.table_page import tables_page
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.bead_truth import beads_layout
@@ -154,8 +156,8 @@ def flags_page() -> str:
     """Every flag with its meaning and remedy, from the register of words."""
     text = _NOTE + '# Flags\n\n'
     text += (
-        '`quality` is a sum of these values, 0 where no fault is known; the tables and the JSON '
-        'of `nanorocks analyse` and `/diagnostics` name them. '
+        '`quality` of an array is a sum of these values, 0 where no fault is known; tables, JSON '
+        'and `/diagnostics` name them. '
         '[speed.md](../method/speed.md#the-flags) says when the less obvious ones are set.\n\n'
     )
     return text + _table(
@@ -188,6 +190,8 @@ FILES = {
     'docs/reference/topics.md': topics_page,
     'docs/reference/parameters.md': parameters_page,
     'docs/reference/flags.md': flags_page,
+    'docs/reference/python.md': python_page,
+    'docs/reference/tables.md': tables_page,
 }
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from nanorocks_ros.cli.films.film_options import filmed_tray
 from nanorocks_ros.cli.main import build_parser
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.studies.measure.told_film import filmed_tray
 
 
 def parsed(*arguments):

@@ -25,8 +25,9 @@ from nanorocks_ros.recordings.messages.message_builders import image_message, ti
 from nanorocks_ros.records import CorEstimate, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
-from nanorocks_ros.studies.analysis.results_folder import BAG_NAME, write_results
+from nanorocks_ros.studies.analysis.results_folder import write_results
 from nanorocks_ros.studies.analysis.results_json import as_json
+from nanorocks_ros.studies.results.results_provenance import BAG_NAME
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array, layout
 

@@ -1,0 +1,74 @@
+"""``nr.simulate``, ``nr.track`` and ``nr.measure`` on one film whose truth is known."""
+
+from __future__ import annotations
+
+import pytest
+from matplotlib.figure import Figure
+
+import nanorocks_ros as nr
+
+TRUTH, WALLS = 0.85, 0.97
+# Of a bead of 2 mm in a close-up of tray 1.
+DIAMETER_PX = 77.4
+
+
+@pytest.fixture(scope='module')
+def film(tmp_path_factory):
+    path = tmp_path_factory.mktemp('films') / 'film.avi'
+    nr.simulate(tray=1, duration=9.0, restitution=TRUTH, wall_restitution=WALLS, seed=1, film=path)
+    return path
+
+
+@pytest.fixture(scope='module')
+def measured(film):
+    return nr.measure(film, diameter_px=DIAMETER_PX, diameter_mm=2, height_mm=3, progress=True)
+
+
+def test_contacts_of_a_film_give_the_true_restitutions(measured):
+    cor = measured.cor.set_index('partner')
+    assert measured.usable
+    for partner, truth in (('beads', TRUTH), ('walls', WALLS)):
+        row = cor.loc[partner]
+        assert row['restitution_lower'] < truth < row['restitution_upper']
+        assert row['restitution_lower'] < row['restitution_lower_68'] < row['restitution']
+        assert row['restitution'] < row['restitution_upper_68'] < row['restitution_upper']
+    kinds = measured.contacts['kind'].value_counts()
+    assert kinds['collision'] == cor.loc['beads', 'contacts']
+    assert kinds['rebound'] == cor.loc['walls', 'contacts']
+    assert measured.contacts.attrs['units']['speed_before'] == 'm/s'
+    assert measured.decay is None
+
+
+def test_tracks_and_speeds_are_tables(measured):
+    assert measured.tracks['id'].nunique() == 15
+    assert measured.speeds['mean_speed'].max() == pytest.approx(6e-3, rel=0.5)
+
+
+def test_results_lie_beside_the_film_and_are_taken_from_there(measured, film):
+    assert measured.folder == film.parent / '.nanorocks/film.avi_measured'
+    before = (measured.folder / 'tracks.npz').stat().st_mtime_ns
+    again = nr.measure(film, diameter_px=DIAMETER_PX, diameter_mm=2, height_mm=3)
+    assert (measured.folder / 'tracks.npz').stat().st_mtime_ns == before
+    assert again.contacts.equals(measured.contacts)
+
+
+def test_the_summary_tells_what_is_missing_in_the_words_of_python(measured):
+    text = repr(measured)
+    assert 'decay: not read; it needs the container: corners, sides_mm' in text
+    assert 'all' in text or 'beads seen' in text
+    assert '<table>' in measured._repr_html_()
+    assert isinstance(measured.plot(), Figure)
+
+
+def test_without_any_length_all_is_in_px(film):
+    tracked = nr.track(film, diameter_px=DIAMETER_PX)
+    names = set(tracked.tracks.columns)
+    assert {'x_px', 'vx_px'} <= names
+    assert 'x' not in names
+    assert len(tracked.plot().axes) == 1
+    assert 'diameter_mm gives them in mm' in repr(tracked)
+
+
+def test_a_film_of_which_nothing_is_told_is_an_error(film):
+    with pytest.raises(nr.ConfigurationError, match='diameter_px=31'):
+        nr.measure(film)
