@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 _PACKAGE = 'nanorocks_ros'
 _OLDEST_PYTHON = (3, 10)
-_DEVELOPER_EXTRAS = {'ros', 'test', 'dev'}
+_DEVELOPER_EXTRAS = {'ros', 'test', 'dev', 'docs', 'messages'}
 _PURPOSES = {
     'cluster': 'work on other machines (--scheduler)',
     'dashboard': 'the live page (nanorocks dashboard)',
+    'jpeg': 'faster decoding of JPEG',
     'parquet': 'tables as .parquet files',
 }
 
