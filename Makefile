@@ -55,7 +55,8 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/studies/libraries test/studies/sweeps test/cli/simulation/test_sweep.py \
         test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py \
         test/test_contributing.py test/test_docs_code.py test/test_printed_numbers.py \
-        test/test_tutorial.py
+        test/test_tutorial.py test/test_gallery.py test/interface test/studies/measure \
+        test/cli/films test/studies/gas_statistics test/tools/docs_pages
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \

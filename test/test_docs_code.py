@@ -29,7 +29,19 @@ RUN_BY_THEIR_OWN_TESTS = ('CONTRIBUTING.md', 'docs/start/tutorial.md')
 
 # Programs of others, which have tests of their own.
 FOREIGN = {
-    *('cd', 'export', 'source', 'pip', 'dask', 'colcon', 'rosdep', 'ssh', 'rviz2', 'ros2'),
+    *(
+        'cd',
+        'export',
+        'source',
+        'pip',
+        'dask',
+        'colcon',
+        'rosdep',
+        'ssh',
+        'rviz2',
+        'ros2',
+        'docker',
+    ),
     *('make', 'python', 'nanorocks', '.venv/bin/python'),
 }
 # Options named in a sentence, and whose they are.

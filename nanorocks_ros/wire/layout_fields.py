@@ -82,7 +82,8 @@ def exact_values(
     Parameters
     ----------
     fields : sequence of LayoutField, (n_fields,)
-    elements : sequence of float, (n_elements,)
+    elements : sequence of float, (n_elements,) or (n_fields,)
+        Without the remainders, as earlier versions wrote it, times are rounded.
 
     Returns
     -------
@@ -90,5 +91,6 @@ def exact_values(
     """
     numbers = np.asarray(elements, dtype=np.float64)
     values = numbers[: len(fields)].copy()
-    values[[field.is_exact for field in fields]] += numbers[len(fields) :]
+    if len(numbers) > len(fields):
+        values[[field.is_exact for field in fields]] += numbers[len(fields) :]
     return values

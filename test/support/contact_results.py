@@ -16,7 +16,7 @@ from nanorocks_ros.records import (
     CorStatus,
     Interval,
 )
-from nanorocks_ros.wire.array_layouts import layout, to_array
+from nanorocks_ros.wire.array_layouts import field_value, layout
 
 SHAKEN, FIRST, LAST = 10.0, 1.75, 21.75
 
@@ -25,9 +25,8 @@ def write_table(path, records):
     """A table as `nanorocks analyse` writes it."""
     fields = layout(type(records[0])).fields
     names, units = zip(*((field.name, field.unit) for field in fields), strict=True)
-    write_csv(
-        path, float_columns(names, units), [to_array(record, 0).tolist() for record in records]
-    )
+    rows = [[field_value(record, field, 0) for field in fields] for record in records]
+    write_csv(path, float_columns(names, units), rows)
 
 
 def contact_results(folder, law, *, contacts=150, seed=1, tray=1, late=0):

@@ -336,6 +336,13 @@ def test_not_known_is_nan_and_never_zero():
     assert math.isnan(to_array(before_the_first, EPOCH)[2])
 
 
+def test_an_array_of_an_earlier_version_has_no_remainders():
+    count = len(layout(SpeedEstimate).fields)
+    values = to_array(RECORDS[0], EPOCH)[:count]
+    back = from_array(SpeedEstimate, values, tray=3, epoch_ns=EPOCH, where='test')
+    assert abs(back.stamp_ns - RECORDS[0].stamp_ns) < 1000
+
+
 def test_an_array_of_another_release_is_refused():
     with pytest.raises(
         FrameError, match=r'/speed: 3 elements where SpeedEstimate has 15; use the'

@@ -60,7 +60,8 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
 def leave_out_film_options(parser: CommandParser) -> None:
     """Leave the finer of the options, and what they replace, out of the short help."""
     scale = '--preprocess-pixels-per-metre', '--preprocess-calibration'
-    parser.leave_out('--look', '--colour', '--density-g-cm3', '--corners', *scale)
+    finer = '--look', '--colour', '--material', '--density-g-cm3', '--corners'
+    parser.leave_out(*finer, *scale)
 
 
 def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...]:

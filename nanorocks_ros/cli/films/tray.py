@@ -60,7 +60,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--image-topic', default='', help='camera topic of a bag')
     parser.add_argument('--json', action='store_true', help='print one JSON object')
     parser.add_argument('--force', action='store_true', help='replace files that exist')
-    parser.leave_out('--look', '--colour', '--density-g-cm3', '--image-topic', '--json', '--force')
+    finer = '--look', '--colour', '--material', '--density-g-cm3'
+    parser.leave_out(*finer, '--image-topic', '--json', '--force')
     parser.set_defaults(run=run, trays_file='')
 
 

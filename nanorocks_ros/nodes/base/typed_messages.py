@@ -1,4 +1,7 @@
-"""Records as typed messages, where the package `nanorocks_msgs` is installed."""
+"""Records as typed messages, where the package `nanorocks_msgs` is installed.
+
+Tested by ``test/nodes/test_typed_messages.py``.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,10 @@ def test_the_command_makes_the_same_frames(tmp_path):
         assert np.abs(shipped.image.astype(int) - made.image).max() <= 6
     assert count == 60
     kept, again = (BagFrames(bag).truth(START_NS)[1] for bag in (BAGS / 'tray_1_sample', path))
-    assert kept[:60] == again
+    # The times of the sample are rounded, as version 0.1.0 wrote them.
+    for old, new in zip(kept[:60], again, strict=True):
+        assert abs(old.stamp_ns - new.stamp_ns) < 1000
+        assert replace(old, stamp_ns=new.stamp_ns) == new
 
 
 @pytest.mark.parametrize(
