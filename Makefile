@@ -46,7 +46,8 @@ test: venv ## Run all tests, then those of the core with the oldest dependencies
 	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 
-# What takes minutes and only goes through, once more, what other tests go through: analyses of
+# What takes minutes and only goes through, once more, what other tests go through (or compares a
+# picture, which another Matplotlib letters in another way): analyses of
 # whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
 # all dependencies, and one command of it is enough.
 ONCE := test/golden test/validation test/simulation test/inference test/stages test/pipeline \
@@ -56,7 +57,8 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py \
         test/test_contributing.py test/test_docs_code.py test/test_printed_numbers.py \
         test/test_tutorial.py test/test_gallery.py test/interface test/studies/measure \
-        test/cli/films test/studies/gas_statistics test/tools/docs_pages
+        test/cli/films test/studies/gas_statistics test/tools/docs_pages \
+        test/studies/figures/test_demo_figure.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
