@@ -58,7 +58,9 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/test_contributing.py test/test_docs_code.py test/test_printed_numbers.py \
         test/test_tutorial.py test/test_gallery.py test/interface test/studies/measure \
         test/cli/films test/studies/gas_statistics test/tools/docs_pages \
-        test/studies/figures/test_demo_figure.py
+        test/studies/figures/test_demo_figure.py test/studies/inspection \
+        test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
+        test/cli/test_interrupts.py
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \

@@ -19,5 +19,5 @@ def test_an_array_of_another_release_is_refused(graph):
     process = graph.start('haff_fitter')
     graph.until(lambda: publisher.get_subscription_count() == 1)
     publisher.publish(Float32MultiArray(data=[1.0, 2.0]))
-    graph.until(lambda: '2 elements where SpeedEstimate has 13' in graph.output(process))
+    graph.until(lambda: '2 elements where SpeedEstimate has 15' in graph.output(process))
     assert graph.interrupt(process).code == 0
