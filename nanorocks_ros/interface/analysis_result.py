@@ -83,7 +83,7 @@ class AnalysisResult(Result):
 
     def __init__(self, recordings: Sequence[AnalysedRecording], notices: tuple[str, ...]) -> None:
         own = [notice for recording in recordings for notice in recording.analysis.notices]
-        errors = [str(one.analysis.error) for one in recordings if one.analysis.error is not None]
+        errors = [str(error) for item in recordings if (error := item.analysis.error) is not None]
         super().__init__(
             provenance={'recordings': ', '.join(recording.name for recording in recordings)},
             notices=(*notices, *own, *errors),

@@ -5,11 +5,10 @@ from __future__ import annotations
 import glob
 import os
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
-from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError, did_you_mean
 from nanorocks_ros.experiment.recorded_experiment import RecordedSettings, recorded_settings
 from nanorocks_ros.interface.progress_bars import part_bar
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
@@ -220,8 +219,8 @@ def _told_film(values: Mapping[str, Any]) -> ToldByKeywords:
     known = FilmDescription.__annotations__
     for name in values:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            meant = f'; did you mean {near[0]!r}?' if near else ''
+            hint = did_you_mean(name, list(known))
+            meant = f'; {hint}' if hint else ''
             raise ConfigurationError(
                 name, f'is no keyword{meant}', f'choose from {", ".join(known)}'
             )

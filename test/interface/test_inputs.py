@@ -46,7 +46,7 @@ def test_a_wrong_setting_is_answered_with_the_one_that_may_be_meant(name, meant)
 @pytest.mark.parametrize(
     ('call', 'problem'),
     [
-        (lambda: nr.track(SAMPLE, diameter=31), "did you mean 'diameter_px'"),
+        (lambda: nr.track(SAMPLE, diameter=31), 'did you mean diameter_px'),
         (lambda: nr.track(SAMPLE, count=3), 'count: needs diameter_px'),
         (lambda: nr.track(SAMPLE, diameter_px=31, corners=[1, 2, 3]), 'corners: 3 numbers'),
         (lambda: nr.simulate(restitutoin=0.9), 'did you mean restitution'),

@@ -42,8 +42,10 @@ class CommandParser(argparse.ArgumentParser):
 
     def commands(self) -> dict[str, CommandParser]:
         """Name to parser of each command of this one; empty where it has none."""
-        found = [item for item in self._actions if isinstance(item, argparse._SubParsersAction)]
-        return dict(found[0].choices) if found else {}
+        subparsers = [
+            action for action in self._actions if isinstance(action, argparse._SubParsersAction)
+        ]
+        return dict(subparsers[0].choices) if subparsers else {}
 
     def shown(self) -> list[argparse.Action]:
         """The arguments and options of the short help."""

@@ -137,7 +137,7 @@ function drawClock() {
 function drawTray(tray, running) {
   const silent = frozen ? 0 : silentFor(tray);
   const [state, text] = words.trayState(tray, silent);
-  const flagged = words.flags(tray.latest).map((one) => `, ${one}`).join('');
+  const flagged = words.flags(tray.latest).map((flag) => `, ${flag}`).join('');
   at('title').textContent = `Tray ${chosen}`;
   at('about').textContent = tray.description;
   at('state').dataset.state = flagged && state === 'ok' ? 'warning' : state;

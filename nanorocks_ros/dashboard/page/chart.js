@@ -7,14 +7,14 @@ export const colour = (name) => getComputedStyle(document.documentElement).getPr
 
 /** Rows of different curves on one axis of time: one column each, null where a curve has no point. */
 export function aligned(curves) {
-  const full = curves.filter((one) => one.length > 0 && one[0].length > 0);
+  const full = curves.filter((curve) => curve.length > 0 && curve[0].length > 0);
   if (full.length === 0) return null;
   const data = uPlot.join(full);
   const columns = [data[0]];
   let next = 1;
-  for (const one of curves) {
-    const has = one.length > 0 && one[0].length > 0;
-    for (let k = 1; k < one.length; k += 1) {
+  for (const curve of curves) {
+    const has = curve.length > 0 && curve[0].length > 0;
+    for (let k = 1; k < curve.length; k += 1) {
       columns.push(has ? data[next++] : data[0].map(() => null));
     }
   }

@@ -49,9 +49,9 @@ export class SpeedChart extends Chart {
 
   options() {
     const range = (plot) => {
-      const found = extent(plot, [1, 4], this.span) ?? [0, 1];
-      if (this.log) return [found[0] / 1.3, found[1] * 1.3];
-      return [0, found[1] * 1.08];
+      const limits = extent(plot, [1, 4], this.span) ?? [0, 1];
+      if (this.log) return [limits[0] / 1.3, limits[1] * 1.3];
+      return [0, limits[1] * 1.08];
     };
     const read = (data, at) => {
       const value = data[1][at] ?? data[4][at];

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import itertools
 import sys
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import settings
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, did_you_mean
 from nanorocks_ros.nodes.base.qos_overrides import PREFIX as OVERRIDES
 
 if TYPE_CHECKING:
@@ -46,8 +45,8 @@ def unknown_parameters(given: Iterable[str], declared: Iterable[str]) -> list[st
 
 
 def _describe(name: str, declared: Iterable[str]) -> str:
-    nearest = difflib.get_close_matches(name, list(declared), n=1)
-    suggestion = f' (did you mean {nearest[0]!r}?)' if nearest else ''
+    hint = did_you_mean(name, list(declared))
+    suggestion = f' ({hint})' if hint else ''
     return f'no parameter {name!r}{suggestion}'
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -104,5 +103,5 @@ def _unknown_topic(topic: str, entity: str, declared: Iterable[str]) -> str:
 
 
 def _suggestion(name: str, candidates: Collection[str]) -> str:
-    nearest = difflib.get_close_matches(name, candidates, n=1)
-    return f' (did you mean {nearest[0]!r}?)' if nearest else ''
+    hint = did_you_mean(name, candidates)
+    return f' ({hint})' if hint else ''

@@ -28,7 +28,7 @@ def test_a_file_may_hold_what_other_nodes_read_but_no_name_that_none_has(monkeyp
     assert unknown_parameters(('qos_overrides./x.publisher.depth',), OURS) == []
     assert unknown_parameters(('cooling.probabilty', 'rat'), OURS) == [
         "no parameter 'cooling.probabilty'",
-        "no parameter 'rat' (did you mean 'rate'?)",
+        "no parameter 'rat' (did you mean rate?)",
     ]
 
 

@@ -30,9 +30,9 @@ SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
         (
             'haff_fitter',
             f'{SPEED.replace("speed", "sped")}.depth:=3',
-            "(did you mean '/nanorocks/tray_1/speed'?)",
+            '(did you mean /nanorocks/tray_1/speed',
         ),
-        ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean 'noise'?)"),
+        ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean noise"),
     ],
 )
 def test_a_bad_parameter_ends_the_node_with_one_line(graph, name, parameter, message):
