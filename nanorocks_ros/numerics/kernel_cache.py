@@ -19,6 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from nanorocks_ros.numerics.compile_lock import compile_once
+
 # Imports at the left margin; those for the type checker alone are indented and not compiled.
 _IMPORT = re.compile(rb'^(?:from|import) ([\w.]+)', re.MULTILINE)
 _DAY_S = 86_400.0
@@ -63,6 +65,7 @@ def share(dispatcher: Any, module: str) -> None:
         file = own._cache_file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
             cache_path=str(folder), filename_base=own._impl.filename_base, source_stamp=code
         )
+        compile_once(dispatcher, folder)
     # numba compares the version before it unpickles an index: unpickling fails when the module of
     # an argument's type has been moved.
     file._version = (file._version, code)
