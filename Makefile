@@ -22,7 +22,8 @@ unexport PYTHONPATH
 endif
 OLDEST := .venv-oldest
 
-unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONHOME
+# Where Python may not keep what it compiled, each of hundreds of processes compiles it again.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONHOME PYTHONDONTWRITEBYTECODE
 export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
