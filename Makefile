@@ -41,9 +41,11 @@ demo: venv ## Simulate a tray, watch it cool, estimate the coefficient of restit
 # Nodes talk to one another in real time: not beside what keeps all cores busy for minutes.
 NODES := test/nodes test/test_colcon.py
 SIDE_BY_SIDE := --numprocesses auto --dist loadfile
+# In the order of test/conftest.py; the oldest pytest-xdist sorts files in its own.
+LONGEST_FIRST := $(SIDE_BY_SIDE) --no-loadscope-reorder
 
 test: venv ## Run all tests, then those of the core with the oldest dependencies
-	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES)) $(PYTEST_ARGS)
+	@$(RUN) python -m pytest $(LONGEST_FIRST) $(patsubst %,--ignore=%,$(NODES)) $(PYTEST_ARGS)
 	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS)
 	@$(MAKE) test-oldest
 

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,34 @@ _SWITCHES = (
     '--disable-component-update',
     '--disable-sync',
 )
+
+# Files that take longest (`--durations`), in the order in which they begin: at the end of a run
+# no processor waits for one of them. The first of them compile different functions, so that
+# processes that begin side by side do not wait for each other.
+LONGEST = (
+    'test/simulation/test_shaken_tray.py',
+    'test/pipeline/test_tray_measurement.py',
+    'test/simulation/engine/flight/test_gas_drag.py',
+    'test/stages/restitution/test_restitution_estimator.py',
+    'test/test_tutorial.py',
+    'test/studies/reproduction/test_reproduce_paper.py',
+    'test/studies/batch/test_batch_analysis.py',
+    'test/cli/figures/test_figure_cor.py',
+    'test/studies/analysis/test_offline_analysis.py',
+    'test/test_printed_numbers.py',
+    'test/interface/test_notebooks.py',
+    'test/stages/bodies/test_turning_bodies.py',
+    'test/validation/test_foreign_films.py',
+    'test/studies/libraries/test_cluster_simulations.py',
+    'test/tools/docs_pages/test_site.py',
+)
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the longest files, then those with most tests."""
+    sizes = Counter(item.path for item in items)
+    places = {ROOT / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: (places.get(item.path, len(LONGEST)), -sizes[item.path]))
 
 
 @pytest.fixture(scope='session')
