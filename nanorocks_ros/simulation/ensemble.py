@@ -14,7 +14,7 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.simulation.engine import observables as columns
-from nanorocks_ros.simulation.engine.event_loop import RunOutput, run_until
+from nanorocks_ros.simulation.engine.event_loop import run_until
 from nanorocks_ros.simulation.engine.flight.rigid_motion import new_motions
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, new_state
@@ -25,6 +25,7 @@ from nanorocks_ros.simulation.engine.input_checks import (
 )
 from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN
 from nanorocks_ros.simulation.engine.rules.collision_rules import restitution_table
+from nanorocks_ros.simulation.engine.run_record import RunRecorder
 from nanorocks_ros.simulation.initial_state import (
     draw_diameters,
     draw_velocities,
@@ -45,10 +46,10 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SimulationSettings
+    from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
     from nanorocks_ros.simulation.initial_state import Inventory
 
-_NO_ROOM = -1
 _MOST_EVENTS = 10_000_000
 
 
@@ -148,7 +149,7 @@ def _small_run(
     instants: NDArray[np.float64],
     run: int,
 ) -> NDArray[np.float64]:
-    """The same, entirely in compiled code."""
+    """The same with less Python: the gas begins in compiled code."""
     rules = rules_of(settings, tray, run).compiled()
     n_species = int(drawn.species.max()) + 1
     rules = rules._replace(restitution=restitution_table(rules.restitution, n_species))
@@ -158,9 +159,7 @@ def _small_run(
     purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
     keys = np.array([key_for(settings.seed, run, purpose) for purpose in purposes])
     ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))
-    rows = np.zeros((instants.size + 1, columns.columns(n_species)))
-    ends = instants[-1:] if instants.size else np.zeros(1)
-    status = _cool(
+    placed, state = _begin(
         rules,
         ranges,
         drawn.species,
@@ -171,26 +170,29 @@ def _small_run(
         settings.mean_speed,
         settings.speeds == 'maxwellian',
         settings.vertical_speed_factor,
-        np.concatenate((instants, ends)),
-        rows,
     )
-    if status == _NO_ROOM:
+    if placed < drawn.density.size:
         raise SimulationError(
             f'tray {tray.number}, run {run}',
             'found no room for all beads',
             'give fewer or smaller beads',
         )
+    ends = instants[-1:] if instants.size else np.zeros(1)
+    times = np.concatenate((instants, ends))
+    output = RunRecorder(state, rules, times[:0].copy(), times, n_species, log=False).output
+    # Of the same types as for a single gas, so that the engine is compiled once for both.
+    status = run_until(state, rules, float(times[-1]), _MOST_EVENTS, output)
     if status != DONE:
         raise SimulationError(
             f'tray {tray.number}, run {run}',
             f'more than {_MOST_EVENTS} events',
             'raise the restitution or shorten the run',
         )
-    return rows
+    return output.observations
 
 
 @compiled
-def _cool(
+def _begin(
     rules: Rules,
     ranges: NDArray[np.float64],
     species: NDArray[np.int32],
@@ -201,31 +203,14 @@ def _cool(
     mean_speed: float,
     maxwell: bool,
     vertical: float,
-    times: NDArray[np.float64],
-    rows: NDArray[np.float64],
-) -> int:
-    """One run; writes observations (n_times, n_columns), and returns the status."""
+) -> tuple[int, State]:
+    """Begin a run: the number of beads that found room, and the state of the gas."""
     diameters = draw_diameters(ranges[0], ranges[1], keys[0])
-    n = diameters.size
     sides = np.array((rules.sides[0], rules.sides[1], rules.sides[2]))
     radii = 0.5 * diameters
     positions, placed = pack_beads(radii, sides, np.zeros(3, dtype=np.bool_), keys[1], MOST_TRIES)
-    if placed < n:
-        return _NO_ROOM
     masses = sphere_masses(diameters, ranges[2])
     set_drag(drag, diameters, ranges[2], viscosity)
     velocities = draw_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
     state = new_state(positions, velocities, radii, masses, species, drag, motions, rules)
-    nothing = np.empty((0, 0, 3))
-    output = RunOutput(
-        times[:0],
-        nothing,
-        nothing,
-        nothing,
-        np.empty((0, 0), dtype=np.int32),
-        times,
-        rows,
-        np.empty((0, 6)),
-        np.zeros(4, dtype=np.int64),
-    )
-    return run_until(state, rules, times[-1], _MOST_EVENTS, output)
+    return placed, state
