@@ -101,8 +101,7 @@ def _run(number: int) -> Ended:
     pattern = _PATTERNS[number % len(_PATTERNS)]
     busy = number // len(_PATTERNS) % 2 == 1
     wait, gap = random.uniform(0.0, _LONGEST_WAIT_S), random.uniform(*_GAPS_S)
-    with _load(busy):
-        code, complete, seconds = signalled(pattern, wait, gap)
+    code, complete, seconds = signalled(pattern, wait, gap, busy=busy)
     names = ' '.join(each.name for each in pattern)
     return Ended(names, busy, code, complete, seconds)
 
@@ -130,7 +129,7 @@ def _row(names: str, machine: str, runs: list[Ended]) -> str:
 
 
 def signalled(
-    pattern: tuple[signal.Signals, ...], wait: float, gap: float
+    pattern: tuple[signal.Signals, ...], wait: float, gap: float, *, busy: bool
 ) -> tuple[int, bool, float]:
     """Record, send signals, and look at what is left.
 
@@ -141,6 +140,8 @@ def signalled(
         From the first message of the recording to the first signal.
     gap : float, [s]
         Between two signals.
+    busy : bool
+        Whether all cores are busy from the first message to the end.
 
     Returns
     -------
@@ -150,17 +151,29 @@ def signalled(
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
         process = _recording(bag)
-        _await(bag, process)
-        time.sleep(wait)
-        start = time.monotonic()
-        process.send_signal(pattern[0])
-        for number in pattern[1:]:
-            _wait_at_most(process, gap)
-            process.send_signal(number)
-        code = process.wait(_ENDS_WITHIN_S)
-        seconds = time.monotonic() - start
+        try:
+            _await(bag, process)
+            with _load(busy):
+                code, seconds = _ended(process, pattern, wait, gap)
+        finally:
+            process.kill()
+            process.wait()
         complete = (bag / 'metadata.yaml').exists() and open_bag(bag).complete
         return code, complete, seconds
+
+
+def _ended(
+    process: subprocess.Popen[bytes], pattern: tuple[signal.Signals, ...], wait: float, gap: float
+) -> tuple[int, float]:
+    """Send the signals; exit code and time to the end, [s]."""
+    time.sleep(wait)
+    start = time.monotonic()
+    process.send_signal(pattern[0])
+    for number in pattern[1:]:
+        _wait_at_most(process, gap)
+        process.send_signal(number)
+    code = process.wait(_ENDS_WITHIN_S)
+    return code, time.monotonic() - start
 
 
 def _recording(bag: Path) -> subprocess.Popen[bytes]:
