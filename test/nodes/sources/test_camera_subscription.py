@@ -185,7 +185,7 @@ def test_a_lone_far_stamp_is_told_and_dropped(graph, node, away):
     assert graph.interrupt(process).code == 0
 
 
-def test_a_silent_camera_and_the_camera_info_of_another_one_are_told(graph):
+def test_the_camera_info_of_another_camera_is_told(graph):
     statuses = []
     graph.node.create_subscription(
         DiagnosticArray, '/diagnostics', lambda message: statuses.extend(message.status), 10
@@ -197,10 +197,4 @@ def test_a_silent_camera_and_the_camera_info_of_another_one_are_told(graph):
     lens = "frame_id 'left', but the images"
     camera.film_until(lambda: statuses and lens in statuses[-1].message)
     assert statuses[-1].level == DiagnosticStatus.WARN
-    # The camera stops, but its publisher is there.
-    silent = '/nanorocks/camera/image_raw: no frame for'
-    graph.until(lambda: statuses[-1].message.startswith(silent))
-    graph.until(lambda: statuses[-1].level == DiagnosticStatus.ERROR)
-    assert statuses[-1].message.startswith(silent)
-    camera.film_until(lambda: statuses[-1].level == DiagnosticStatus.WARN)
     assert graph.interrupt(process).code == 0
