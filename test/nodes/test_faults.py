@@ -22,7 +22,7 @@ from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 
-SMALL = ('width_px:=240', 'height_px:=240', 'first_shake:=0.5', 'frame_rate:=15.0')
+SMALL = ('width_px:=240', 'height_px:=240', 'first_shake:=0.5', 'frame_rate:=10.0')
 STAGES = {
     'haff_fitter': topics.COR,
     'cluster_autocorrelator': topics.CLUSTER,
@@ -71,11 +71,12 @@ def test_separate_nodes_started_in_reversed_order_survive_the_loss_of_each(graph
         parameters = SMALL if name == 'simulator' else ()
         running[name] = graph.start(name, *parameters)
 
-    def start_all():
-        for name in (*STAGES, 'simulator'):
-            start(name)
-
-    seconds = heard.after(start_all, *STAGES.values())
+    # The camera last; each waits for those that it listens to.
+    for name in STAGES:
+        start(name)
+    image = graph.node.resolve_topic_name(topics.RAW.name)
+    graph.until(lambda: graph.node.count_subscribers(image) == 1, _PATIENCE_S)
+    seconds = heard.after(lambda: start('simulator'), *STAGES.values())
     fault_table('nodes start in reversed order', 'all results come', seconds)
     for name, topic in {**STAGES, 'simulator': topics.STATE}.items():
         kill(graph, running[name])
@@ -97,8 +98,10 @@ def test_pipeline_and_its_camera_survive_the_loss_of_the_other(graph, fault_tabl
         parameters = SMALL if name == 'simulator' else ('source:=topic',)
         running[name] = graph.start(name, *parameters)
 
-    start('simulator')
-    heard.after(lambda: start('pipeline'), topics.SPEED)
+    start('pipeline')
+    image = graph.node.resolve_topic_name(topics.RAW.name)
+    graph.until(lambda: graph.node.count_subscribers(image) == 1, _PATIENCE_S)
+    heard.after(lambda: start('simulator'), topics.SPEED)
     for name, told in {'pipeline': 'its results', 'simulator': 'the results'}.items():
         kill(graph, running[name])
         seconds = heard.after(lambda name=name: start(name), topics.SPEED)
