@@ -3,6 +3,7 @@
 ``python -m benchmarks golden [OPTION ...]`` is a check, not a measurement; see its ``--help``.
 ``python -m benchmarks fuzz [OPTION ...]`` damages every kind of input; see its ``--help``.
 ``python -m benchmarks kills [OPTION ...]`` kills jobs at random instants and resumes them.
+``python -m benchmarks signals [OPTION ...]`` interrupts recordings at random instants.
 ``python -m benchmarks structure [COMMIT]`` counts modules and lines.
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from benchmarks import fuzz, golden, kills, structure
+from benchmarks import fuzz, golden, kills, signals, structure
 
 ALL = (
     'cold_start',
@@ -30,7 +31,6 @@ ALL = (
     'recognition',
     'plate_cost',
     'recorder',
-    'signals',
     'foreign_world',
     'ranks',
     'contacts_alone',
@@ -71,13 +71,15 @@ ALL = (
 
 
 def main() -> int:
-    """Run each benchmark and print its report, or one of the four checks."""
+    """Run each benchmark and print its report, or one of the five checks."""
     if sys.argv[1:2] == ['golden']:
         return golden.main(sys.argv[2:])
     if sys.argv[1:2] == ['fuzz']:
         return fuzz.main(sys.argv[2:])
     if sys.argv[1:2] == ['kills']:
         return kills.main(sys.argv[2:])
+    if sys.argv[1:2] == ['signals']:
+        return signals.main(sys.argv[2:])
     if sys.argv[1:2] == ['structure']:
         structure.report(*sys.argv[2:3])
         return 0

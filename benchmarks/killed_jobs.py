@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import signal
@@ -10,19 +9,20 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.outputs.npz_archive import read_archive
-from nanorocks_ros.recordings.bag.offered_topics import offered_topic
+from benchmarks.killed_job_files import (
+    arrays_of,
+    messages_of,
+    results_of,
+    whole_folder,
+    write_bag,
+    write_film,
+)
 from nanorocks_ros.recordings.bag.reader import open_bag
-from nanorocks_ros.recordings.bag.writer import BagWriter
-from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
-from nanorocks_ros.records import NS
-from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _NANOROCKS = [str(Path(sys.executable).with_name('nanorocks'))]
 _LONGEST_LOSS_S = 2.0
 _RECORDED_S = (1.5, 5.0)
-_FILMS, _FRAMES = 3, 150
+_FILMS = 3
 _RECORDER = """
 import os, sys, time
 import numpy as np
@@ -51,18 +51,29 @@ while True:
     os.write(1, b'%d\\n' % stamp)
     time.sleep(1 / 30)
 """
+_REPRODUCTION = """
+import sys
+from pathlib import Path
+from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
+from nanorocks_ros.studies.reproduction.reproduce_paper import reproduce
+
+plan = CampaignPlan(cycles=1, seconds=3.0)
+reproduce(Path(sys.argv[1]), plan, Workers(processes=1), 2, lambda *_: None, lambda _: None)
+"""
 
 
-def _killed_after(command: list[str], seconds: float) -> bytes:
-    """Run a command, kill it and all that it started, and return what it wrote."""
+def _was_killed(command: list[str], seconds: float) -> bool:
+    """Run a command, and kill it and all that it started unless it has ended by then."""
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
-    time.sleep(seconds)
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    output, _ = process.communicate()
-    return output
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(seconds)
+        return False
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    return True
 
 
 class _Recording:
@@ -121,32 +132,41 @@ class _Resumed:
 
     def kill(self, random: np.random.Generator) -> tuple[bool, None]:
         self._clear()
-        _killed_after(self._filled(), float(random.uniform(0.2, 1.0)) * self._seconds)
+        while not _was_killed(self._filled(), float(random.uniform(0.2, 1.0)) * self._seconds):
+            self._clear()
         self._make_room()
-        self._run()
+        try:
+            self._run()
+        except subprocess.CalledProcessError as error:
+            print(error.stderr.decode(), file=sys.stderr)
+            return False, None
         return self._fingerprint(self._output) == self._wanted, None
 
     def _make_room(self) -> None:
         """What the user does before the same command is called again: nothing."""
 
 
-class _Sweep(_Resumed):
+class _Simulations(_Resumed):
+    """Simulations that end in one archive."""
+
+    words: str
+
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
-        words = 'sweep --runs 24 --times 0:10:11 --restitution 0.8,0.9 --task-seconds 0.2'
-        command = [*_NANOROCKS, *words.split(), '--workers', '1', '-o', 'OUTPUT.npz']
-        super().__init__(folder, command, _arrays)
+        command = [*_NANOROCKS, *self.words.split(), '--workers', '1', '-o', 'OUTPUT.npz']
+        super().__init__(folder, command, arrays_of)
 
     def _make_room(self) -> None:
         # It was finished before the kill: an existing file is not replaced.
         self._output.with_suffix('.npz').unlink(missing_ok=True)
 
 
-def _arrays(path: Path) -> str:
-    digest = hashlib.sha256()
-    for name, array in sorted(read_archive(path.with_suffix('.npz')).items()):
-        digest.update(f'{name} {array.dtype} {array.shape}'.encode() + array.tobytes())
-    return digest.hexdigest()
+class _Sweep(_Simulations):
+    words = 'sweep --runs 24 --times 0:10:11 --restitution 0.8,0.9 --task-seconds 0.2'
+
+
+class _Library(_Simulations):
+    words = 'library --tray 1 --nodes 254 --rough-nodes 0 --runs 12'
 
 
 class _Import(_Resumed):
@@ -156,9 +176,9 @@ class _Import(_Resumed):
         films = folder / 'films'
         films.mkdir(parents=True)
         for number in range(_FILMS):
-            _write_film(films / f'film_{number}.avi', number)
+            write_film(films / f'film_{number}.avi', number)
         command = [*_NANOROCKS, 'import', str(films), '--each', '-o', 'OUTPUT']
-        super().__init__(folder, command, _messages)
+        super().__init__(folder, command, messages_of)
 
 
 class _Salvage(_Resumed):
@@ -167,7 +187,7 @@ class _Salvage(_Resumed):
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
         source = folder / 'source.avi'
-        _write_film(source, 9, frames=1500)
+        write_film(source, 9, frames=1500)
         subprocess.run(
             [*_NANOROCKS, 'import', str(source), '-o', str(folder / 'whole')],
             check=True,
@@ -176,7 +196,7 @@ class _Salvage(_Resumed):
         file = next((folder / 'whole').glob('*.mcap'))
         file.write_bytes(file.read_bytes()[:-2000])
         command = [*_NANOROCKS, 'salvage', str(folder / 'whole'), '-o', 'OUTPUT']
-        super().__init__(folder, command, _messages)
+        super().__init__(folder, command, messages_of)
 
     def _make_room(self) -> None:
         if self._output.exists():
@@ -191,61 +211,17 @@ class _Batch(_Resumed):
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
-        bags = [str(_write_bag(folder / f'bag_{number}', number)) for number in range(3)]
+        bags = [str(write_bag(folder / f'bag_{number}', number)) for number in range(3)]
         command = [*_NANOROCKS, 'analyse', *bags, '--trays', '1', '--workers', '1', '-o', 'OUTPUT']
-        super().__init__(folder, command, _results)
+        super().__init__(folder, command, results_of)
 
 
-def _write_bag(path: Path, number: int) -> Path:
-    """A bright square that moves over a gray tray."""
-    table = {topic.absolute(): offered_topic(topic) for topic in (topics.EPOCH, topics.RAW)}
-    start_ns = (1_500_000_000 + 100 * number) * NS
-    with BagWriter(path, table, metadata={}) as bag:
-        bag.write(topics.EPOCH.absolute(), start_ns, time_message(start_ns))
-        for frame in range(60):
-            pixels = np.full((210, 210), 120, np.uint8)
-            pixels[50:70, 20 + frame : 40 + frame] = 200
-            stamp_ns = start_ns + frame * NS // 30
-            message = image_message(stamp_ns, 'camera', 'mono8', pixels)
-            bag.write(topics.RAW.absolute(), stamp_ns, message)
-    return path
+class _Reproduction(_Resumed):
+    """What `nanorocks reproduce` calls, with two films of 3 s, which it never makes so short."""
 
-
-def _results(path: Path) -> str:
-    digest = hashlib.sha256()
-    for table in sorted(path.rglob('*.csv')):
-        digest.update(f'{table.relative_to(path)}'.encode() + table.read_bytes())
-    for bag in sorted(path.rglob('results_bag')):
-        for message in open_bag(bag).messages():
-            digest.update(f'{message.topic} {message.log_time_ns}'.encode() + message.cdr)
-    return digest.hexdigest()
-
-
-def _messages(path: Path) -> str:
-    digest = hashlib.sha256()
-    bags = [path] if list(path.glob('*.mcap')) else sorted(path.iterdir())
-    for bag in bags:
-        reader = open_bag(bag)
-        for message in reader.messages():
-            digest.update(f'{bag.name} {message.topic} {message.log_time_ns}'.encode())
-            digest.update(message.cdr)
-        digest.update(b'complete' if reader.complete else b'cut')
-    return digest.hexdigest()
-
-
-def _write_film(path: Path, seed: int, frames: int = _FRAMES) -> None:
-    import av
-
-    random = np.random.default_rng(seed)
-    with av.open(str(path), 'w') as container:
-        stream = container.add_stream('mjpeg', rate=30)
-        stream.width, stream.height, stream.pix_fmt = 320, 240, 'yuvj420p'
-        for number in range(frames):
-            pixels = random.integers(0, 255, (240, 320, 3), dtype=np.uint8)
-            frame = av.VideoFrame.from_ndarray(pixels, format='bgr24')
-            frame.pts, frame.time_base = number, Fraction(1, 30)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir()
+        super().__init__(folder, [sys.executable, '-c', _REPRODUCTION, 'OUTPUT'], whole_folder)
 
 
 Job = _Recording | _Resumed
@@ -254,7 +230,9 @@ JOBS: dict[str, Callable[[Path], Job]] = {
     'salvage': _Salvage,
     'import --each': _Import,
     'sweep': _Sweep,
+    'library': _Library,
     'batch': _Batch,
+    'reproduce': _Reproduction,
 }
-# A batch takes the longest.
-ORDER = ('recording', 'salvage', 'import --each', 'sweep') * 6 + ('batch',)
+# A batch and a reproduction take the longest.
+ORDER = ('recording', 'salvage', 'import --each', 'sweep', 'library') * 4 + ('batch', 'reproduce')

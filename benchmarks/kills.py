@@ -7,12 +7,12 @@ lacks and prints the table of all of them, so it may be interrupted and called a
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks import journal
 from benchmarks.fuzzing.mutations import generator_of
 from benchmarks.killed_jobs import JOBS, ORDER, Job
 
@@ -26,7 +26,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument('--count', type=int, default=20, help='kills of all jobs together')
     parser.add_argument('--journal', help='file of outcomes, to which this call adds')
     options = parser.parse_args(arguments)
-    done = _read(options.journal)
+    done = journal.read(options.journal)
     jobs: dict[str, Job] = {}
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -37,27 +37,11 @@ def main(arguments: Sequence[str]) -> int:
                 if name not in jobs:
                     jobs[name] = JOBS[name](Path(folder) / name)
                 done[number] = [name, *jobs[name].kill(generator_of('kills', number))]
-                _note(options.journal, number, done[number])
+                journal.note(options.journal, number, done[number])
     except KeyboardInterrupt:
         print('interrupted; the same command continues', file=sys.stderr)
     print(table(list(done.values())))
     return int(not all(good for _, good, _ in done.values()))
-
-
-def _read(journal: str | None) -> dict[int, list]:
-    done: dict[int, list] = {}
-    if journal and Path(journal).is_file():
-        for line in Path(journal).read_text('utf-8').splitlines():
-            if line.endswith(']'):
-                number, *outcome = json.loads(line)
-                done[number] = outcome
-    return done
-
-
-def _note(journal: str | None, number: int, outcome: list) -> None:
-    if journal:
-        with Path(journal).open('a', encoding='utf-8') as stream:
-            stream.write(f'\n{json.dumps([number, *outcome])}')
 
 
 def table(outcomes: list[list]) -> str:

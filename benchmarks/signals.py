@@ -4,29 +4,33 @@ Each run starts a pipeline that films and records a simulated tray, waits until 
 there and a random time more, and sends SIGINT, SIGTERM or two of them 0.05 to 2 s apart; half of
 the runs on a busy machine, with two more processes for each core. The table counts the runs that
 ended with exit code 0 and left a complete bag with its metadata.
+
+``python -m benchmarks signals --count 200 --journal signals.jsonl`` makes the runs that the
+journal lacks and prints the table of all of them, so it may be interrupted and called again.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
-import random
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING
 
+from benchmarks import journal
+from benchmarks.fuzzing.mutations import generator_of
 from nanorocks_ros.recordings.bag.reader import open_bag
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
-_RUNS = 200
 _PATTERNS = (
     (signal.SIGINT,),
     (signal.SIGTERM,),
@@ -38,17 +42,21 @@ _PATTERNS = (
 _LONGEST_WAIT_S = 3.0
 _GAPS_S = 0.05, 2.0
 _STARTS_WITHIN_S, _ENDS_WITHIN_S = 900.0, 60.0
-_DOMAIN = 77
+_DOMAIN = '77'
 _CHECK_S = 0.005
 _BUSY_PER_CORE = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Ended:
     """How one run ended.
 
     Parameters
     ----------
+    names : str
+        Of the signals.
+    busy : bool
+        Whether the machine was busy.
     code : int
         Exit code.
     complete : bool
@@ -57,36 +65,72 @@ class Ended:
         From the first signal to the end of the process.
     """
 
+    names: str
+    busy: bool
     code: int
     complete: bool
     seconds: float
 
-
-def report() -> None:
-    """Print the table."""
-    draw = random.Random(2026)
-    results: dict[tuple[str, bool], list[Ended]] = defaultdict(list)
-    for run in range(_RUNS):
-        pattern = _PATTERNS[run % len(_PATTERNS)]
-        busy = run // len(_PATTERNS) % 2 == 1
-        wait, gap = draw.uniform(0.0, _LONGEST_WAIT_S), draw.uniform(*_GAPS_S)
-        with _load(busy):
-            ended = signalled(pattern, wait, gap)
-        results[' '.join(number.name for number in pattern), busy].append(ended)
-        print(f'{run + 1} of {_RUNS} runs', end='\r', file=sys.stderr, flush=True)
-    print('| signals | machine | runs | exit code 0 | complete bags | median [s] | longest [s] |')
-    print('| --- ' * 7 + '|')
-    for (names, busy), runs in sorted(results.items()):
-        seconds = sorted(ended.seconds for ended in runs)
-        print(
-            f'| {names} | {"busy" if busy else "quiet"} | {len(runs)} '
-            f'| {sum(ended.code == 0 for ended in runs)} '
-            f'| {sum(ended.complete for ended in runs)} '
-            f'| {seconds[len(seconds) // 2]:.2f} | {seconds[-1]:.2f} |'
-        )
+    @property
+    def good(self) -> bool:
+        """Whether nothing was lost."""
+        return self.code == 0 and self.complete
 
 
-def signalled(pattern: tuple[signal.Signals, ...], wait: float, gap: float) -> Ended:
+def main(arguments: Sequence[str]) -> int:
+    """Run and print; 1 if a run did not end as it should."""
+    parser = argparse.ArgumentParser(prog='benchmarks signals', description=__doc__.split(':')[0])
+    parser.add_argument('--count', type=int, default=200, help='runs of all kinds together')
+    parser.add_argument('--journal', help='file of outcomes, to which this call adds')
+    options = parser.parse_args(arguments)
+    done = journal.read(options.journal)
+    try:
+        for number in range(options.count):
+            if number not in done:
+                done[number] = list(astuple(_run(number)))
+                journal.note(options.journal, number, done[number])
+    except KeyboardInterrupt:
+        print('interrupted; the same command continues', file=sys.stderr)
+    runs = [Ended(*outcome) for outcome in done.values()]
+    print(table(runs))
+    return int(not all(run.good for run in runs))
+
+
+def _run(number: int) -> Ended:
+    random = generator_of('signals', number)
+    pattern = _PATTERNS[number % len(_PATTERNS)]
+    busy = number // len(_PATTERNS) % 2 == 1
+    wait, gap = random.uniform(0.0, _LONGEST_WAIT_S), random.uniform(*_GAPS_S)
+    code, complete, seconds = signalled(pattern, wait, gap, busy=busy)
+    names = ' '.join(each.name for each in pattern)
+    return Ended(names, busy, code, complete, seconds)
+
+
+def table(runs: list[Ended]) -> str:
+    """Runs of each kind, how many ended well, and how long that took."""
+    lines = [
+        '| signals | machine | runs | exit code 0 | complete bags | median [s] | longest [s] |',
+        '| --- ' * 7 + '|',
+    ]
+    for names, busy in sorted({(run.names, run.busy) for run in runs}):
+        own = [run for run in runs if (run.names, run.busy) == (names, busy)]
+        lines.append(_row(names, 'busy' if busy else 'quiet', own))
+    lines.append(_row('all', '', runs))
+    return '\n'.join(lines)
+
+
+def _row(names: str, machine: str, runs: list[Ended]) -> str:
+    seconds = [run.seconds for run in runs]
+    return (
+        f'| {names} | {machine} | {len(runs)} | {sum(run.code == 0 for run in runs)} '
+        f'| {sum(run.complete for run in runs)} '
+        f'| {median(seconds):.2f} | {max(seconds):.2f} |'
+    )
+
+
+def signalled(
+    pattern: tuple[signal.Signals, ...], wait: float, gap: float, *, busy: bool
+) -> tuple[int, bool, float]:
     """Record, send signals, and look at what is left.
 
     Parameters
@@ -96,30 +140,51 @@ def signalled(pattern: tuple[signal.Signals, ...], wait: float, gap: float) -> E
         From the first message of the recording to the first signal.
     gap : float, [s]
         Between two signals.
+    busy : bool
+        Whether all cores are busy from the first message to the end.
+
+    Returns
+    -------
+    int, bool, float
+        As in `Ended`: exit code, whether the bag is complete, and seconds.
     """
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
         process = _recording(bag)
-        _await(bag, process)
-        time.sleep(wait)
-        start = time.monotonic()
-        process.send_signal(pattern[0])
-        for number in pattern[1:]:
-            _wait_at_most(process, gap)
-            process.send_signal(number)
-        code = process.wait(_ENDS_WITHIN_S)
-        seconds = time.monotonic() - start
+        try:
+            _await(bag, process)
+            with _load(busy):
+                code, seconds = _ended(process, pattern, wait, gap)
+        finally:
+            process.kill()
+            process.wait()
         complete = (bag / 'metadata.yaml').exists() and open_bag(bag).complete
-        return Ended(code=code, complete=complete, seconds=seconds)
+        return code, complete, seconds
+
+
+def _ended(
+    process: subprocess.Popen[bytes], pattern: tuple[signal.Signals, ...], wait: float, gap: float
+) -> tuple[int, float]:
+    """Send the signals; exit code and time to the end, [s]."""
+    time.sleep(wait)
+    start = time.monotonic()
+    process.send_signal(pattern[0])
+    for number in pattern[1:]:
+        _wait_at_most(process, gap)
+        process.send_signal(number)
+    code = process.wait(_ENDS_WITHIN_S)
+    return code, time.monotonic() - start
 
 
 def _recording(bag: Path) -> subprocess.Popen[bytes]:
     command = [sys.executable, '-m', 'nanorocks_ros.nodes', 'pipeline', '--ros-args']
     for parameter in ('source:=simulator', 'duration:=600.0', f'record:={bag}'):
         command += ['-p', parameter]
-    environment = dict(
-        os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', ROS_DOMAIN_ID=str(_DOMAIN)
-    )
+    environment = {
+        'ROS_DOMAIN_ID': _DOMAIN,
+        **os.environ,
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    }
     return subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

@@ -155,9 +155,18 @@ def _mismatches(
                         'subscription': node_name_of(subscription),
                         'reason': reason,
                         'of_types': differing,
+                        'offered': _offered(publisher, subscription),
                     }
                 )
     return pairs
+
+
+def _offered(publisher: TopicEndpointInfo, subscription: TopicEndpointInfo) -> dict[str, str]:
+    """What a subscription would have to request, by policy."""
+    from nanorocks_ros.nodes.base.qos_compatibility import mismatches
+
+    pairs = mismatches([publisher.qos_profile], [subscription.qos_profile])
+    return {pair.policy: pair.offered.lower() for pair in pairs}
 
 
 def _mismatch(publisher: TopicEndpointInfo, subscription: TopicEndpointInfo) -> str | None:

@@ -114,9 +114,9 @@ class Graph:
         process.wait(_PATIENCE_S)
         return Finished(process.returncode, self.output(process))
 
-    def until(self, condition):
+    def until(self, condition, patience_s=_PATIENCE_S):
         """Spin until a condition holds; fail with what the nodes printed if it never does."""
-        end = time.monotonic() + _PATIENCE_S
+        end = time.monotonic() + patience_s
         while not condition():
             if time.monotonic() > end:
                 logs = '\n'.join(self.output(process) for process, _ in self._running)
@@ -192,3 +192,27 @@ def own_node(domain, monkeypatch):
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()
+
+
+_FAULTS = pytest.StashKey()
+
+
+@pytest.fixture
+def fault_table(request):
+    """Adds a row to the table of faults that is printed at the end."""
+    rows = request.config.stash.setdefault(_FAULTS, [])
+
+    def add(fault, outcome, seconds=None):
+        after = '' if seconds is None else f'{seconds:.1f}'
+        rows.append(f'| {fault} | {outcome} | {after} |')
+
+    return add
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    rows = config.stash.get(_FAULTS, [])
+    if rows:
+        terminalreporter.write_line('| fault | what happens | after [s] |')
+        terminalreporter.write_line('| --- | --- | --- |')
+        for row in rows:
+            terminalreporter.write_line(row)

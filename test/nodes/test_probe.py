@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from builtin_interfaces.msg import Time
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float32MultiArray, String
 
@@ -40,30 +42,48 @@ def test_frames_are_sent_and_counted(graph):
     assert checks['executables']['status'] == 'ok'
 
 
-def test_incompatible_endpoints_are_listed(graph):
-    graph.node.create_publisher(Float32MultiArray, 'tray_1/cor', BEST_EFFORT)
-    graph.node.create_subscription(Float32MultiArray, 'tray_1/cor', print, RELIABLE)
+def test_what_does_not_connect_is_listed_and_the_advice_connects_it(graph):
+    graph.node.create_publisher(Float32MultiArray, 'tray_1/speed', BEST_EFFORT)
     graph.node.create_publisher(Float32MultiArray, 'tray_2/cor', RELIABLE)
     graph.node.create_subscription(Float32MultiArray, 'tray_2/cor', print, BEST_EFFORT)
     graph.node.create_subscription(Float32MultiArray, 'tray_3/cor', print, RELIABLE)
     graph.node.create_publisher(String, 'tray_4/speed', RELIABLE)
-    fitter = graph.start('haff_fitter', 'trays:=[4]')
-    graph.until(lambda: 'publishes std_msgs/msg/String' in graph.output(fitter))
+    graph.node.create_publisher(Time, 'epoch', RELIABLE)
+    node = graph.start('cluster_autocorrelator', 'trays:=[1, 4]')
+    graph.until(lambda: 'publishes std_msgs/msg/String' in graph.output(node))
     code, checks = doctor(graph, '--graph')
     assert code == 1
-    deaf, fine, alone = (checks[f'/nanorocks/tray_{k}/cor'] for k in (1, 2, 3))
-    other_type = checks['/nanorocks/tray_4/speed']
-    assert deaf['status'] == 'problem'
-    assert 'no data: /nanorocks/listener -> /nanorocks/listener' in deaf['found']
+    fine, alone = (checks[f'/nanorocks/tray_{k}/cor'] for k in (2, 3))
+    deaf, other_type = (checks[f'/nanorocks/tray_{k}/speed'] for k in (1, 4))
+    early = checks['/nanorocks/epoch']
+    assert deaf['status'] == early['status'] == other_type['status'] == 'problem'
+    assert 'no data: /nanorocks/listener -> /nanorocks/cluster_autocorrelator' in deaf['found']
     assert 'reliab' in deaf['found'].lower()
-    assert 'qos_overrides./nanorocks/tray_1/cor.subscription' in deaf['remedy']
+    assert 'transient local' in early['found'].lower()
     assert fine['status'] == 'ok'
-    assert other_type['status'] == 'problem'
     assert 'the types differ: std_msgs/msg/String, std_msgs' in other_type['found']
-    assert other_type['remedy'].startswith('remap the topic')
     assert alone['status'] == 'warning'
     assert 'no node -> /nanorocks/listener' in alone['found']
     assert not any('doctor' in check['found'] for check in checks.values())
+    graph.interrupt(node)
+    # As it is advised: an override of one policy each, and another name for one topic.
+    advised = [
+        word
+        for check in (deaf, early)
+        for word in re.findall(r'qos_overrides\S+:=\w+', check['remedy'])
+    ]
+    assert len(advised) == 2
+    (rename,) = re.findall(r'-r (\S+:=/\w+)', other_type['remedy'])
+    node = graph.start(
+        'cluster_autocorrelator', 'trays:=[1, 4]', *advised, arguments=('-r', rename)
+    )
+    name = graph.node.resolve_topic_name('tray_1/speed')
+    graph.until(lambda: graph.node.count_subscribers(name) == 1)
+    _, checks = doctor(graph, '--graph')
+    assert checks['/nanorocks/tray_1/speed']['status'] == 'ok'
+    assert checks['/nanorocks/epoch']['status'] == 'ok'
+    assert checks['/nanorocks/tray_4/speed']['status'] == 'ok'
+    assert graph.interrupt(node).code == 0
 
 
 def test_a_ros_that_does_not_load_is_a_problem_told_in_one_line(graph, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from nanorocks_ros.recordings.messages.image_messages import (
     frame_from_image,
     stamp_ns_of,
 )
+from nanorocks_ros.recordings.stamp_check import StampCheck
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 
 # Frames that are held back for a camera_info that somebody publishes, but has not sent yet.
 _PATIENCE_FRAMES = 30
+# A frame with a far stamp that waits for the next one is passed on when none comes, [s].
+_NEXT_FRAME_S = 1.0
 
 
 class CameraSubscription:
@@ -78,12 +82,15 @@ class CameraSubscription:
         self.camera_info: CameraInfo | None = None
         self.message: Image | CompressedImage | None = None
         self.topic = node.resolve_topic_name(topic.name)
+        self._stamps: StampCheck[Image | CompressedImage] = StampCheck(self.topic)
+        self._heard_at = 0.0
         self._info_topic = node.resolve_topic_name(topics.CAMERA_INFO.name)
         if on_view is not None:
             self._subscribe_to_camera_info()
         node.topic_monitor.require_single_publisher(topic.name)
         self._silence = Silence(self.topic)
         self._acknowledgement = FrameAcknowledgement(node, [node.listen(topic, self._receive)])
+        node.create_timer(_NEXT_FRAME_S, self._release_last, clock=node.steady_clock)
         node.diagnostics.watched += [
             lambda: self._silence.problem(node.count_publishers(self.topic)),
             self._other_camera,
@@ -123,10 +130,27 @@ class CameraSubscription:
 
     def _receive(self, message: Image | CompressedImage) -> None:
         self._silence.hear()
+        self._heard_at = time.monotonic()
+        stamp_ns = stamp_ns_of(message)
         try:
-            self._hold_or_pass_on(message)
+            self._take(self._stamps.push(stamp_ns, message))
         finally:
-            self._acknowledgement.acknowledge(stamp_ns_of(message))
+            self._acknowledgement.acknowledge(stamp_ns)
+
+    def _release_last(self) -> None:
+        """Pass on a frame that waits for the next one, when none comes."""
+        if time.monotonic() - self._heard_at >= _NEXT_FRAME_S:
+            self._take(self._stamps.release())
+
+    def _take(self, decided: list[tuple[Image | CompressedImage, FrameError | None]]) -> None:
+        """Use or refuse each message; one that cannot be used does not keep the others."""
+        for message, refusal in decided:
+            try:
+                if refusal is not None:
+                    raise refusal
+                self._hold_or_pass_on(message)
+            except FrameError as error:
+                self._node.diagnostics.refuse(error)
 
     def _hold_or_pass_on(self, message: Image | CompressedImage) -> None:
         waiting = self._on_view is not None and self._info is None and not self._started

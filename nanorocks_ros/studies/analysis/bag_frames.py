@@ -16,8 +16,8 @@ from nanorocks_ros.recordings.messages.image_messages import (
     frame_from_image,
     valid_stamp_ns,
 )
+from nanorocks_ros.recordings.stamp_check import StampCheck
 from nanorocks_ros.records import NS, Frame, GroundTruth
-from nanorocks_ros.studies.analysis.impossible_stamps import with_possible_stamps
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
@@ -133,19 +133,31 @@ class BagFrames:
         In the place of a frame that cannot be used stands the reason: an encoding that is
         not supported, a picture that cannot be decoded, a stamp that cannot be.
         """
-        frames = (frame for _, frame in self.recorded_frames())
-        return with_possible_stamps(frames, self.where)
+        return (frame for _, frame in self.recorded_frames())
 
     def recorded_frames(
         self, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[tuple[BagMessage, Frame | FrameError]]:
-        """Each frame with its message as it was recorded.
+        """Each frame, or the reason why it cannot be used, with its message as it was recorded.
 
         Parameters
         ----------
         start_ns, end_ns : int, optional, [ns]
             Log times of the first and last one.
         """
+        check: StampCheck[tuple[BagMessage, Frame]] = StampCheck(self.where)
+        for message, frame in self._decoded(start_ns, end_ns):
+            if isinstance(frame, FrameError):
+                yield message, frame
+                continue
+            for (of_frame, checked), refusal in check.push(frame.stamp_ns, (message, frame)):
+                yield of_frame, refusal or checked
+        for (of_frame, checked), refusal in check.end():
+            yield of_frame, refusal or checked
+
+    def _decoded(
+        self, start_ns: int | None, end_ns: int | None
+    ) -> Iterator[tuple[BagMessage, Frame | FrameError]]:
         read = frame_from_compressed if self._compressed else frame_from_image
         for message in self.reader.messages([self.topic], start_ns, end_ns):
             try:

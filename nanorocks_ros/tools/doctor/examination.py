@@ -93,15 +93,7 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
             f'{mismatch["publisher"]} -> {mismatch["subscription"]}: {mismatch["reason"]}'
             for mismatch in topic['mismatches']
         )
-        remedy = (
-            f'for our nodes: -p qos_overrides.{name}.subscription.reliability:='
-            'best_effort, or .durability:=volatile; for other nodes: request the offered QoS'
-        )
-        if any(mismatch['of_types'] for mismatch in topic['mismatches']):
-            remedy = (
-                f'remap the topic of one of them (-r {name}:=/OTHER); for a camera set '
-                'transport:=raw or transport:=compressed'
-            )
+        remedy = _mismatch_remedy(name, topic['mismatches'])
         return Finding(name=name, status=Status.PROBLEM, found=f'no data: {pairs}', remedy=remedy)
     if not senders:
         return Finding(
@@ -125,6 +117,21 @@ def _topic_finding(topic: dict[str, Any]) -> Finding:
             remedy='stop all but one, or start each graph in another namespace (-r __ns:=/NAME)',
         )
     return Finding(name=name, found=found)
+
+
+def _mismatch_remedy(name: str, mismatches: list[dict[str, Any]]) -> str:
+    if any(mismatch['of_types'] for mismatch in mismatches):
+        return (
+            f'remap the topic of one of them (-r {name}:=/OTHER); for a camera set '
+            'transport:=raw or transport:=compressed'
+        )
+    offered = {policy: value for pair in mismatches for policy, value in pair['offered'].items()}
+    overrides = ' '.join(
+        f'-p qos_overrides.{name}.subscription.{policy}:={value}'
+        for policy, value in offered.items()
+    )
+    others = 'let the subscription request the offered QoS'
+    return f'for our nodes: {overrides}; for other nodes: {others}' if overrides else others
 
 
 def _of_result(name: str) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 import nanorocks_ros
 from nanorocks_ros.numerics.kernel_cache import cache_root
 from nanorocks_ros.tools.doctor.findings import Finding, Status
+from nanorocks_ros.tools.doctor.package_checks import pip_install
 
 _GB = 1e9
 # A minute of 1080p JPEGs at quality 85 takes about half a gigabyte.
@@ -121,7 +122,7 @@ def opencv() -> Finding:
             name='OpenCV',
             status=Status.PROBLEM,
             found=f'cannot be imported: {error}',
-            remedy='pip install opencv-python-headless',
+            remedy=pip_install('opencv-python-headless'),
         )
     cores = len(os.sched_getaffinity(0))
     return Finding(

@@ -5,9 +5,12 @@ Tested by ``test/tools/doctor/test_machine_checks.py``.
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import platform
 import sys
+import sysconfig
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.tools.doctor.findings import Finding, Status
@@ -24,6 +27,8 @@ _PURPOSES = {
     'jpeg': 'faster decoding of JPEG',
     'parquet': 'tables as .parquet files',
 }
+# Modules that come under several names, or with a system, where pip does not know them.
+_MODULES = {'opencv-python-headless': 'cv2'}
 
 
 def python() -> Finding:
@@ -49,7 +54,7 @@ def libraries() -> list[Finding]:
                 name='libraries',
                 status=Status.WARNING,
                 found=f'{_PACKAGE} runs from its source tree and is not installed',
-                remedy='pip install --editable .',
+                remedy=pip_install('--editable .'),
             )
         ]
     needed = [requirement for requirement in requirements if _applies(requirement, '')]
@@ -82,29 +87,51 @@ def _applies(requirement: Requirement, extra: str) -> bool:
 def _library_finding(
     name: str, requirements: list[Requirement], status: Status, purpose: str
 ) -> Finding:
-    versions: dict[str, str] = {}
-    missing = {}
-    for requirement in requirements:
-        try:
-            versions[requirement.name] = importlib.metadata.version(requirement.name)
-        except importlib.metadata.PackageNotFoundError:
-            missing[requirement.name] = f'{requirement.name} is not installed'
-            continue
-        if not requirement.specifier.contains(versions[requirement.name], prereleases=True):
-            missing[requirement.name] = (
-                f'{requirement.name} {versions[requirement.name]} is not {requirement.specifier}'
-            )
-    if not missing:
+    versions = {requirement.name: _version(requirement.name) for requirement in requirements}
+    missing = [each for each in requirements if versions[each.name] is None]
+    other = [
+        each
+        for each in requirements
+        if (version := versions[each.name]) is not None
+        and not each.specifier.contains(version, prereleases=True)
+    ]
+    if not missing and not other:
         listed = ', '.join(f'{key} {value}' for key, value in sorted(versions.items()))
         return Finding(name=name, found=listed)
-    packages = ' '.join(
-        f"'{requirement.name}{requirement.specifier}'"
-        for requirement in requirements
-        if requirement.name in missing
-    )
+    found = [f'{each.name} is not installed' for each in missing]
+    # What a distribution ships is often older than what is tested, and does.
+    found += [
+        f'{each.name} {versions[each.name]} is not tested, {each.specifier} is' for each in other
+    ]
     return Finding(
         name=name,
-        status=status,
-        found=f'{", ".join(missing.values())}; for {purpose}',
-        remedy=f'pip install {packages}',
+        status=status if missing else Status.WARNING,
+        found=f'{", ".join(found)}; for {purpose}',
+        remedy=pip_install(
+            ' '.join(f"'{each.name}{each.specifier}'" for each in (*missing, *other))
+        ),
     )
+
+
+def _version(name: str) -> str | None:
+    """The version of a library; None where it is not installed."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        if name not in _MODULES:
+            return None
+    try:
+        return str(importlib.import_module(_MODULES[name]).__version__)
+    except ImportError:
+        return None
+
+
+def pip_install(packages: str) -> str:
+    """How to install something with this Python."""
+    marker = Path(sysconfig.get_path('stdlib')) / 'EXTERNALLY-MANAGED'
+    if sys.prefix == sys.base_prefix and marker.exists():
+        return (
+            f'pip install --break-system-packages {packages}, or in an environment of its own '
+            '(docs/use/commands.md)'
+        )
+    return f'pip install {packages}'

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 from nanorocks_ros.tools.doctor.findings import Finding, Status
+from nanorocks_ros.tools.doctor.package_checks import pip_install
 
 _PACKAGE = 'nanorocks_ros'
 _DISTRIBUTION = 'jazzy'
@@ -28,7 +29,8 @@ def has_ros() -> bool:
     return importlib.util.find_spec('rclpy') is not None
 
 
-def _has_wheels() -> bool:
+def has_wheels() -> bool:
+    """Whether ROS is installed from wheels."""
     try:
         importlib.metadata.distribution('ros-rclpy')
     except importlib.metadata.PackageNotFoundError:
@@ -38,13 +40,13 @@ def _has_wheels() -> bool:
 
 def installation() -> Finding:
     """The installation of ROS 2: wheels or a sourced one, never both."""
-    sourced, wheels = os.environ.get('ROS_DISTRO'), _has_wheels()
+    sourced, wheels = os.environ.get('ROS_DISTRO'), has_wheels()
     if not has_ros():
         return Finding(
             name='ROS 2',
             status=Status.PROBLEM,
             found='not installed: nodes cannot run; the offline commands can',
-            remedy="source /opt/ros/jazzy/setup.bash, or pip install 'nanorocks_ros[ros]'",
+            remedy='source /opt/ros/jazzy/setup.bash, or ' + pip_install("'nanorocks_ros[ros]'"),
         )
     if sourced and wheels:
         return Finding(
@@ -68,7 +70,7 @@ def installation() -> Finding:
 def bootstrap() -> Finding:
     """Whether the libraries of the ROS wheels are on the library path."""
     name = 'libraries of the wheels'
-    if not _has_wheels():
+    if not has_wheels():
         return Finding(name=name, found='no wheels')
     paths = os.environ.get('LD_LIBRARY_PATH', '').split(os.pathsep)
     own = Path(sys.prefix) / 'lib'

@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 
@@ -97,29 +96,3 @@ def test_the_override_that_the_warning_names_solves_the_mismatch(graph):
     graph.until(lambda: publisher.get_subscription_count() == 1)
     assert 'no data' not in graph.output(process)
     assert graph.interrupt(process).code == 0
-
-
-def test_a_publisher_of_another_type_is_told_as_an_error_until_it_is_gone(graph):
-    statuses = []
-
-    def receive(message):
-        statuses.extend(status for status in message.status if status.name.endswith('haff_fitter'))
-
-    graph.node.create_subscription(DiagnosticArray, '/diagnostics', receive, 10)
-    other = graph.node.create_publisher(Image, topics.SPEED.of(1), 1)
-    process = graph.start('haff_fitter')
-    graph.until(lambda: statuses and statuses[-1].level == DiagnosticStatus.ERROR)
-    text = statuses[-1].message
-    assert 'listener publishes sensor_msgs/msg/Image, this node takes std_msgs/msg/Float' in text
-    assert '-r /nanorocks/tray_1/speed:=/OTHER' in text
-    assert text in graph.output(process)
-    graph.node.destroy_publisher(other)
-    graph.until(lambda: statuses[-1].level == DiagnosticStatus.WARN)
-    assert graph.interrupt(process).code == 0
-
-
-def test_two_pipelines_with_the_same_results_are_told(graph):
-    for _ in range(2):
-        last = graph.start('haff_fitter')
-    graph.until(lambda: 'tray_1/cor: published by' in graph.output(last))
-    assert '-r __ns:=/NAME' in graph.output(last)

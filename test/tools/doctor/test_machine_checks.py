@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib.metadata
+import re
 import shutil
+import subprocess
+import sys
+import sysconfig
 from collections import namedtuple
 
 import pytest
@@ -35,7 +39,9 @@ def test_the_shared_memory_of_a_container_is_too_small(monkeypatch, tmp_path):
     with_free(monkeypatch, 63_000_000)  # 64 MB, as Docker gives
     finding = machine_checks.shared_memory(tmp_path)
     assert finding.status is Status.PROBLEM
-    assert '--shm-size' in finding.remedy
+    (size,) = re.findall(r'--shm-size=(\d+)g', finding.remedy)
+    with_free(monkeypatch, int(size) * GB)
+    assert machine_checks.shared_memory(tmp_path).status is Status.OK
 
 
 def test_small_socket_buffers_matter_between_machines_only(monkeypatch, tmp_path):
@@ -44,7 +50,11 @@ def test_small_socket_buffers_matter_between_machines_only(monkeypatch, tmp_path
     monkeypatch.setenv(RANGE, 'SUBNET')
     finding = machine_checks.receive_buffer(limit)
     assert finding.status is Status.WARNING
-    assert 'sysctl -w net.core.rmem_max=' in finding.remedy
+    (size,) = re.findall(r'sysctl -w net.core.rmem_max=(\d+)', finding.remedy)
+    limit.write_text(size)
+    assert machine_checks.receive_buffer(limit).status is Status.OK
+    limit.write_text('212992\n')
+    assert f'export {RANGE}=LOCALHOST' in finding.remedy
     monkeypatch.setenv(RANGE, 'LOCALHOST')
     assert machine_checks.receive_buffer(limit).status is Status.OK
 
@@ -59,26 +69,60 @@ def test_kernels_that_cannot_be_cached_are_found(monkeypatch, tmp_path):
     assert 'NUMBA_CACHE_DIR' in finding.remedy
 
 
-def test_an_outdated_library_is_named_with_the_required_version(monkeypatch):
-    real = importlib.metadata.version
-    monkeypatch.setattr(
-        importlib.metadata, 'version', lambda name: '0.1' if name == 'mcap' else real(name)
-    )
-    everything = package_checks.libraries()[0]
-    assert everything.status is Status.PROBLEM
-    assert 'mcap 0.1 is not >=1.2.1' in everything.found
-    assert everything.remedy == "pip install 'mcap>=1.2.1'"
-
-
-def test_a_missing_extra_is_a_warning_with_its_purpose(monkeypatch):
+def installed_as(monkeypatch, **versions):
+    """Let libraries have other versions; None: pip does not know them."""
     real = importlib.metadata.version
 
     def version(name):
-        if name == 'pyarrow':
+        if name not in versions:
+            return real(name)
+        if versions[name] is None:
             raise importlib.metadata.PackageNotFoundError(name)
-        return real(name)
+        return versions[name]
 
     monkeypatch.setattr(importlib.metadata, 'version', version)
+
+
+def test_an_outdated_library_is_a_warning_whose_advice_installs_what_is_tested(monkeypatch):
+    installed_as(monkeypatch, mcap='0.1')
+    everything = package_checks.libraries()[0]
+    assert everything.status is Status.WARNING
+    assert 'mcap 0.1 is not tested, >=1.2.1 is' in everything.found
+    assert everything.remedy == "pip install 'mcap>=1.2.1'"
+    # The oldest that this installs satisfies the check.
+    installed_as(monkeypatch, mcap=everything.remedy.partition('>=')[2].rstrip("'"))
+    assert package_checks.libraries()[0].status is Status.OK
+
+
+def test_a_missing_library_is_a_problem(monkeypatch):
+    installed_as(monkeypatch, mcap=None)
+    everything = package_checks.libraries()[0]
+    assert everything.status is Status.PROBLEM
+    assert 'mcap is not installed; for everything' in everything.found
+    assert everything.remedy == "pip install 'mcap>=1.2.1'"
+
+
+def test_the_opencv_of_a_distribution_is_found_without_pip(monkeypatch):
+    import cv2
+
+    installed_as(monkeypatch, **{'opencv-python-headless': None})
+    assert f'opencv-python-headless {cv2.__version__}' in package_checks.libraries()[0].found
+    monkeypatch.setattr(cv2, '__version__', '4.5.1')
+    everything = package_checks.libraries()[0]
+    assert everything.status is Status.WARNING
+    assert 'opencv-python-headless 4.5.1 is not tested' in everything.found
+
+
+def test_pip_is_advised_as_the_system_allows_it(monkeypatch, tmp_path):
+    assert package_checks.pip_install('av') == 'pip install av'
+    (tmp_path / 'EXTERNALLY-MANAGED').touch()
+    monkeypatch.setattr(sysconfig, 'get_path', lambda _: str(tmp_path))
+    monkeypatch.setattr(sys, 'prefix', sys.base_prefix)
+    assert package_checks.pip_install('av').startswith('pip install --break-system-packages av')
+
+
+def test_a_missing_extra_is_a_warning_with_its_purpose(monkeypatch):
+    installed_as(monkeypatch, pyarrow=None)
     findings = {library.name: library for library in package_checks.libraries()}
     assert findings['extra [parquet]'].status is Status.WARNING
     assert '.parquet' in findings['extra [parquet]'].found
@@ -109,6 +153,62 @@ def test_a_missing_profile_is_a_problem(monkeypatch):
     finding = ros_checks.profile()
     assert finding.status is Status.PROBLEM
     assert '/no/such/profile.xml' in finding.found
+
+
+@pytest.mark.parametrize(
+    ('check', 'variables'),
+    [
+        (ros_checks.domain, {'ROS_DOMAIN_ID': '-1'}),
+        (ros_checks.domain, {'ROS_DOMAIN_ID': '233'}),
+        (ros_checks.discovery, {RANGE: 'localhost'}),
+        (ros_checks.discovery, {RANGE: 'OFF'}),
+        (ros_checks.discovery, {RANGE: 'SUBNET', 'ROS_LOCALHOST_ONLY': '1'}),
+        (ros_checks.profile, {RANGE: 'SUBNET'}),
+        (ros_checks.profile, {RANGE: 'LOCALHOST', 'FASTDDS_DEFAULT_PROFILES_FILE': '/none'}),
+        (lambda: ros_checks.executables(('pipeline',)), {'AMENT_PREFIX_PATH': '/none'}),
+        (machine_checks.compiled_kernels, {'NUMBA_CACHE_DIR': '/proc/none'}),
+    ],
+)
+def test_the_advice_about_a_variable_removes_the_finding(monkeypatch, tmp_path, check, variables):
+    for name in (
+        'ROS_LOCALHOST_ONLY',
+        'RMW_IMPLEMENTATION',
+        'FASTDDS_DEFAULT_PROFILES_FILE',
+        'FASTRTPS_DEFAULT_PROFILES_FILE',
+    ):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    advice = check().remedy
+    assert check().status is not Status.OK
+    if 'colcon' in advice:
+        pytest.skip('the nodes are not installed here')
+    for name, value in re.findall(r'export (\w+)=([^\s;,]+)', advice):
+        monkeypatch.setenv(name, value.replace('/a/folder/of/yours', str(tmp_path)))
+    for names in re.findall(r'unset ([\w ]+)', advice):
+        for name in names.split():
+            monkeypatch.delenv(name, raising=False)
+    assert check().status is Status.OK
+
+
+def test_the_libraries_of_the_wheels_are_found_as_the_advice_says(monkeypatch):
+    if not ros_checks.has_wheels():
+        pytest.skip('there are no wheels of ROS here')
+    monkeypatch.setenv('LD_LIBRARY_PATH', '/usr/lib')
+    advice = ros_checks.bootstrap().remedy
+    assert ros_checks.bootstrap().status is Status.PROBLEM
+    # Without the variable, the next Python that loads ROS sets the path and starts again.
+    check = (
+        'import rclpy; from nanorocks_ros.tools.doctor.ros_checks import bootstrap; '
+        'print(bootstrap().status.name)'
+    )
+    finished = subprocess.run(
+        ['sh', '-c', f'{advice} && exec {sys.executable} -c "{check}"'],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert finished.stdout.split() == ['OK'], finished.stderr
 
 
 def test_executables_are_found_as_ros2_run_finds_them(monkeypatch, tmp_path):
