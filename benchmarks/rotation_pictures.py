@@ -51,14 +51,14 @@ def _bulk(axes):
             collision_counts,
             temperature_ratio_course(collision_counts, gas.PAIRS, tangential),
             color=colour,
-            label=f'β = {tangential:g}',
+            label=f'β = {tangential:g}'.replace('-', '−'),
         )
         axes.plot(collisions, ratio, '.', ms=5, color=colour)
     axes.set_xlim(0.0, 40.0)
     axes.set_ylim(0.0)
     axes.set_xlabel('collisions of each bead')
     axes.set_ylabel('rotation over translation')
-    axes.set_title('without walls: theory (lines), 500 simulated beads')
+    axes.set_title('500 beads without walls; lines: theory')
     axes.legend()
 
 
@@ -83,15 +83,16 @@ def _widths(axes):
             means = curves(speeds, TOGETHER, 0.0, noise)
             values, speed = gas.paper_values(means, STEP, tray)
             axes.plot(middle, gas.spread(values, speed, EDGES)[1], style, color=colour, label=name)
-    axes.plot([], [], '--', color='gray', label='the same with 0.1 mm/s of noise')
     axes.axvline(5.0, color='black', lw=0.7, ls=':')
     axes.set_xscale('log')
     axes.set_yscale('log')
     plain_numbers(axes.xaxis)
     axes.set_xlabel(f'collision speed, {RELATIVE_TO_MEAN_SPEED:g} v [mm/s]')
     axes.set_ylabel("half width (68 %) of the paper's COR")
-    axes.set_title(f'tray 1, mean of {TOGETHER} cycles')
-    axes.legend()
+    axes.set_title(f'tray 1, {TOGETHER} cycles; dashed: 0.1 mm/s of noise')
+    # Room for the legend below.
+    axes.set_ylim(3e-4)
+    axes.legend(loc='lower left', ncols=2, columnspacing=0.8)
 
 
 def _readings(axes):
@@ -103,27 +104,19 @@ def _readings(axes):
             for mu in FRICTIONS
         ]
         for colour, text, values in (
-            (
-                COLOURS[1],
-                'decay, walls known',
-                [reading[0]['walls known'].mean[0] for reading in readings],
-            ),
-            (
-                COLOURS[0],
-                'decay and contacts',
-                [reading[0]['all'].mean[0] for reading in readings],
-            ),
-            (COLOURS[3], 'contacts alone', [reading[1][4] for reading in readings]),
+            (COLOURS[1], 'decay', [reading[0]['walls known'].mean[0] for reading in readings]),
+            (COLOURS[0], 'both', [reading[0]['all'].mean[0] for reading in readings]),
+            (COLOURS[3], 'contacts', [reading[1][4] for reading in readings]),
         ):
-            axes.plot(
-                FRICTIONS, values, f'{marker}-', color=colour, label=f'tray {number}: {text}'
-            )
+            label = f'tray {number}: {text}'
+            axes.plot(FRICTIONS, values, f'{marker}-', color=colour, label=label)
     axes.axhline(gas.PAIRS, color='black', lw=0.7)
     # Room for the legend above.
-    axes.set_ylim(0.0, 1.3)
+    axes.set_ylim(0.0, 1.35)
     axes.set_xlabel('friction μ of beads and walls, β = 0.4')
     axes.set_ylabel('restitution of the beads as read')
-    axes.set_title('rough beads taken for smooth; the truth is 0.89')
+    axes.set_yticks([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    axes.set_title('rough beads taken for smooth; line: truth')
     axes.legend(ncols=2)
 
 

@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     from nanorocks_ros.errors import RecordingError as RecordingError
     from nanorocks_ros.errors import SimulationError as SimulationError
     from nanorocks_ros.interface.analysis import analyse as analyse
-    from nanorocks_ros.interface.analysis import read as read
     from nanorocks_ros.interface.analysis_result import AnalysisResult as AnalysisResult
     from nanorocks_ros.interface.inputs import FilmDescription as FilmDescription
     from nanorocks_ros.interface.measure_result import MeasureResult as MeasureResult
     from nanorocks_ros.interface.measuring import measure as measure
+    from nanorocks_ros.interface.reading import read as read
     from nanorocks_ros.interface.simulating import simulate as simulate
     from nanorocks_ros.interface.simulation_result import SimulationResult as SimulationResult
+    from nanorocks_ros.interface.tables_result import TablesResult as TablesResult
     from nanorocks_ros.interface.tracking import TrackResult as TrackResult
     from nanorocks_ros.interface.tracking import track as track
 
@@ -48,6 +49,7 @@ __all__ = [
     'RecordingError',
     'SimulationError',
     'SimulationResult',
+    'TablesResult',
     'TrackResult',
     '__version__',
     'analyse',
@@ -68,10 +70,11 @@ _MODULES = {
     'RecordingError': 'errors',
     'SimulationError': 'errors',
     'SimulationResult': 'interface.simulation_result',
+    'TablesResult': 'interface.tables_result',
     'TrackResult': 'interface.tracking',
     'analyse': 'interface.analysis',
     'measure': 'interface.measuring',
-    'read': 'interface.analysis',
+    'read': 'interface.reading',
     'simulate': 'interface.simulating',
     'track': 'interface.tracking',
 }

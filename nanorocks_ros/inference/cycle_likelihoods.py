@@ -184,6 +184,9 @@ class MeanRestitution:
         Between beads: mean, standard deviation and interval of the posterior.
     wall_restitution : MeasuredInterval
         Between beads and side walls.
+    restitution_lower_68, restitution_upper_68 : float
+    wall_restitution_lower_68, wall_restitution_upper_68 : float
+        Ends of the intervals with the probability `ONE_SIGMA`.
     tension : float
         Standard deviations by which decays, rebounds and collisions disagree.
     rebounds, collisions : int
@@ -194,6 +197,8 @@ class MeanRestitution:
     wall_friction : Measured
     drag : Measured, [1/s]
     restitution_exponent, wall_restitution_exponent : Interval
+    restitution_exponent_lower_68, restitution_exponent_upper_68 : float
+    wall_restitution_exponent_lower_68, wall_restitution_exponent_upper_68 : float
     impact_speed, wall_impact_speed : float, [m/s]
     impact_restitution, wall_impact_restitution : Interval
     speed_dependent : bool
@@ -203,6 +208,10 @@ class MeanRestitution:
     cycles: int
     restitution: MeasuredInterval
     wall_restitution: MeasuredInterval = UNKNOWN_MEASURED_INTERVAL
+    restitution_lower_68: float = UNKNOWN
+    restitution_upper_68: float = UNKNOWN
+    wall_restitution_lower_68: float = UNKNOWN
+    wall_restitution_upper_68: float = UNKNOWN
     tension: float = UNKNOWN
     rebounds: int = 0
     collisions: int = 0
@@ -212,6 +221,10 @@ class MeanRestitution:
     drag: Measured = UNKNOWN_MEASURED
     restitution_exponent: Interval = UNKNOWN_INTERVAL
     wall_restitution_exponent: Interval = UNKNOWN_INTERVAL
+    restitution_exponent_lower_68: float = UNKNOWN
+    restitution_exponent_upper_68: float = UNKNOWN
+    wall_restitution_exponent_lower_68: float = UNKNOWN
+    wall_restitution_exponent_upper_68: float = UNKNOWN
     impact_speed: float = UNKNOWN
     wall_impact_speed: float = UNKNOWN
     impact_restitution: Interval = UNKNOWN_INTERVAL

@@ -68,18 +68,23 @@ class SpeedDependence(NamedTuple):
         """Whether the walls follow their law, 1 or 0."""
         return 1.0 if self.walls is not None and self.walls.chance < _MAX_CHANCE else 0.0
 
-    def fields(self, ends: NDArray[np.float64]) -> dict[str, Any]:
+    def fields(self, ends: NDArray[np.float64], narrow: NDArray[np.float64]) -> dict[str, Any]:
         """The fields of `CycleRestitution` and `MeanRestitution` that say so.
 
         Parameters
         ----------
         ends : ndarray (3,)
             Probabilities of lower end, value and upper end.
+        narrow : ndarray (3,)
+            The same of an interval of 68 %.
         """
         fields: dict[str, Any] = {'speed_dependent': self.is_seen}
         for prefix, kind in (('', self.beads), ('wall_', self.walls)):
             if kind:
                 fields[f'{prefix}restitution_exponent'] = kind.interval(ends)
+                inner = kind.interval(narrow)
+                fields[f'{prefix}restitution_exponent_lower_68'] = inner.lower
+                fields[f'{prefix}restitution_exponent_upper_68'] = inner.upper
                 fields[f'{prefix}impact_speed'] = kind.speed
                 lower, value, upper = kind.law.at(kind.speed).quantiles(ends).tolist()
                 fields[f'{prefix}impact_restitution'] = Interval(value, lower, upper)

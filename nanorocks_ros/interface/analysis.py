@@ -1,4 +1,4 @@
-"""Analyse recordings, or read results: `nanorocks_ros.analyse` and `nanorocks_ros.read`."""
+"""Analyse recordings: `nanorocks_ros.analyse`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.interface.analysis_result import AnalysedRecording, AnalysisResult
@@ -14,12 +13,9 @@ from nanorocks_ros.interface.inputs import named_paths, recording, settings_of, 
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.pipeline.composition import trays_of
-from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
-from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
 from nanorocks_ros.studies.analysis.offline_analysis import analyse as analyse_bag
-from nanorocks_ros.studies.analysis.results_reader import read_analysis
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -103,47 +99,6 @@ def analyse(
                 )
             )
         return AnalysisResult(analysed, tuple(notices))
-
-
-def read(folder: PathLike) -> AnalysisResult:
-    """Read results that ``nanorocks analyse``, `AnalysisResult.save` or `measure` wrote.
-
-    Parameters
-    ----------
-    folder : path
-        Of one recording, of a batch, or any folder with such folders in it. Of a folder of
-        `measure` it is what the decay of the speeds gave.
-
-    Returns
-    -------
-    AnalysisResult
-        As of `analyse`; ``.combined`` needs what only a batch keeps.
-
-    Raises
-    ------
-    RecordingError
-        When there are no results, or they cannot be read.
-    """
-    with in_python():
-        top = Path(folder).expanduser()
-        if not top.is_dir():
-            raise RecordingError(str(folder), 'is no folder', 'name a folder of results')
-        marks = sorted(top.rglob(RESULTS_MARK), key=lambda mark: natural_key(str(mark)))
-        if not marks:
-            raise RecordingError(
-                str(folder),
-                'holds no results',
-                'name the folder that `nanorocks analyse` or save() wrote',
-            )
-        recordings = []
-        for mark in marks:
-            source, analysis, settings = read_analysis(mark.parent)
-            recordings.append(
-                AnalysedRecording(
-                    name=source, source=mark.parent, settings=settings, analysis=analysis
-                )
-            )
-        return AnalysisResult(recordings, ())
 
 
 class _KeptTracks:

@@ -6,7 +6,7 @@ Tested by ``test/interface/test_analysis.py``.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +14,9 @@ import pandas as pd
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.interface.combined_cycles import combined_frame
-from nanorocks_ros.interface.contact_frames import contact_frame
 from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import frame_of, joined, table_frame, with_column
-from nanorocks_ros.interface.result import Result, Summary
+from nanorocks_ros.interface.result import Result, Summary, run_words
 from nanorocks_ros.outputs.html_report import with_interval
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.records import CorEstimate, headline_in_words
@@ -35,10 +34,11 @@ from nanorocks_ros.studies.analysis.results_json import (
     last_of_each_cycle,
 )
 from nanorocks_ros.studies.analysis.tracks_files import columns_of, track_pieces
+from nanorocks_ros.studies.results.contact_columns import CONTACT_COLUMNS, contact_arrays
 from nanorocks_ros.wire.products import MEASURED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from matplotlib.figure import Figure
@@ -65,6 +65,8 @@ class AnalysedRecording:
     analysis : Analysis
     tracked : TrackedBag or None
         Its tracks, where they were kept.
+    run : mapping
+        Version, date and command of results that were read.
     """
 
     name: str
@@ -72,6 +74,7 @@ class AnalysedRecording:
     settings: PipelineSettings
     analysis: Analysis
     tracked: TrackedBag | None = None
+    run: Mapping[str, Any] = field(default_factory=dict)
 
 
 class AnalysisResult(Result):
@@ -85,7 +88,11 @@ class AnalysisResult(Result):
         own = [notice for recording in recordings for notice in recording.analysis.notices]
         errors = [str(error) for item in recordings if (error := item.analysis.error) is not None]
         super().__init__(
-            provenance={'recordings': ', '.join(recording.name for recording in recordings)},
+            provenance={
+                # Of the first: recordings that are read together were mostly analysed together.
+                **run_words(recordings[0].run),
+                'recordings': ', '.join(recording.name for recording in recordings),
+            },
             notices=(*notices, *own, *errors),
             usable=all(recording.analysis.usable for recording in recordings),
         )
@@ -181,7 +188,8 @@ class AnalysisResult(Result):
         def contacts(recording: AnalysedRecording, tray: int) -> pd.DataFrame:
             results = recording.analysis.trays[tray]
             own: list[Rebound | PairCollision] = [*results.rebounds, *results.collisions]
-            return contact_frame(own, recording.analysis.epoch_ns)
+            arrays = contact_arrays(own, recording.analysis.epoch_ns)
+            return table_frame(CONTACT_COLUMNS, [arrays])
 
         return self._joined(contacts)
 

@@ -13,7 +13,6 @@ import pandas as pd
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.pipeline.composition import trays_of
-from nanorocks_ros.records import ONE_SIGMA
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 if TYPE_CHECKING:
@@ -35,11 +34,8 @@ def combined_frame(
     """
     rows = []
     for tray, (settings, likelihoods) in sorted(evidence.items()):
-        wide = _mean_of(settings, tray, likelihoods)
-        cooling = replace(settings.cooling, probability=ONE_SIGMA)
-        narrow = _mean_of(replace(settings, cooling=cooling), tray, likelihoods)
-        rows.append(_combined_row(tray, wide, narrow))
-    frame = pd.DataFrame(rows, columns=list(_combined_row(0, None, None)))
+        rows.append(_combined_row(tray, _mean_of(settings, tray, likelihoods)))
+    frame = pd.DataFrame(rows, columns=list(_combined_row(0, None)))
     units = {name: '' if name == 'headline' else '1' for name in frame.columns}
     frame.attrs['units'] = units
     return frame
@@ -56,25 +52,22 @@ def _mean_of(
         return None
 
 
-def _combined_row(
-    tray: int, wide: MeanRestitution | None, narrow: MeanRestitution | None
-) -> dict[str, Any]:
+def _combined_row(tray: int, mean: MeanRestitution | None) -> dict[str, Any]:
     """Both restitutions with error and intervals; missing where they are not known."""
-    row: dict[str, Any] = {'tray': tray, 'cycles': None if wide is None else wide.cycles}
+    row: dict[str, Any] = {'tray': tray, 'cycles': None if mean is None else mean.cycles}
     for name in ('restitution', 'wall_restitution'):
-        value = None if wide is None else getattr(wide, name)
-        inner = None if narrow is None else getattr(narrow, name)
+        value = None if mean is None else getattr(mean, name)
         row |= {
             name: getattr(value, 'value', None),
             f'{name}_error': getattr(value, 'error', None),
             f'{name}_lower': getattr(value, 'lower', None),
             f'{name}_upper': getattr(value, 'upper', None),
-            f'{name}_lower_68': getattr(inner, 'lower', None),
-            f'{name}_upper_68': getattr(inner, 'upper', None),
+            f'{name}_lower_68': getattr(mean, f'{name}_lower_68', None),
+            f'{name}_upper_68': getattr(mean, f'{name}_upper_68', None),
         }
     return {
         **row,
-        'rebounds': None if wide is None else wide.rebounds,
-        'collisions': None if wide is None else wide.collisions,
-        'headline': None if wide is None else wide.headline.name.lower(),
+        'rebounds': None if mean is None else mean.rebounds,
+        'collisions': None if mean is None else mean.collisions,
+        'headline': None if mean is None else mean.headline.name.lower(),
     }

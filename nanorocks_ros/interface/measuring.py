@@ -85,15 +85,15 @@ def measure(
         plan = MeasurePlan(
             bag=own.recording.bag,
             name=own.recording.name,
-            folder=_folder(film) if folder is None else Path(folder),
+            folder=_folder(film) if folder is None else Path(folder).expanduser(),
             settings=own.recorded.settings,
             image_topic=image_topic,
             workers=Workers(processes=workers),
             describe=_lines,
         )
         teller = _Teller(shown=progress)
-        measured = measure_film(plan, teller)
-        return MeasureResult(measured, plan, own.notices)
+        measure_film(plan, teller)
+        return MeasureResult(plan.folder, own.notices)
 
 
 def _lines(analysis: Analysis, number: int) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,9 +16,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.outputs.table_columns import Column
     from nanorocks_ros.records import ArrayRecord
-
-# Metres at the start of a unit, with a power.
-_METRES = re.compile(r'^m(?:\^(\d))?(?=$|/)')
 
 
 def frame_of(
@@ -82,28 +78,6 @@ def with_column(
     return frame
 
 
-def in_px(frame: pd.DataFrame, per_metre: float) -> pd.DataFrame:
-    """The frame with lengths in px of the film, for one whose scale is not known.
-
-    Columns with a length are named ``X_px``; those with a mass, which follows from a length that
-    nobody told, are left out.
-    """
-    units, renamed = {}, {}
-    for name, unit in frame.attrs['units'].items():
-        power = _METRES.match(unit)
-        if 'kg' in unit:
-            frame = frame.drop(columns=name)
-        elif power is None:
-            units[name] = unit
-        else:
-            frame[name] *= per_metre ** int(power[1] or 1)
-            renamed[name] = f'{name}_px'
-            units[renamed[name]] = f'px{unit[1:]}'
-    frame = frame.rename(columns=renamed)
-    frame.attrs['units'] = units
-    return frame
-
-
 def table_frame(
     columns: Sequence[Column], pieces: Iterable[Mapping[str, NDArray[Any]]]
 ) -> pd.DataFrame:
@@ -122,5 +96,9 @@ def table_frame(
             for column in columns
         }
     )
+    for column in columns:
+        # Whole numbers of which some are not known.
+        if column.kind == 'int64' and frame[column.name].dtype == object:
+            frame[column.name] = frame[column.name].astype('Int64')
     frame.attrs['units'] = {column.name: column.unit for column in columns}
     return frame

@@ -118,7 +118,10 @@ class Result:
                     f'table {name!r}', 'does not exist', f'choose from {", ".join(makers)}'
                 )
             frame = makers[name]()
-            frame.attrs['provenance'] = dict(self.provenance)
+            frame.attrs['provenance'] = {
+                **frame.attrs.get('provenance', {}),
+                **self.provenance,
+            }
             self._tables[name] = frame
         return self._tables[name]
 
@@ -143,6 +146,19 @@ class Result:
 
     def _repr_html_(self) -> str:
         return self._summary().as_html()
+
+
+def run_words(run: Mapping[str, Any]) -> dict[str, str]:
+    """What tables say of the run that made them: version, date and command, where they are told.
+
+    Parameters
+    ----------
+    run : mapping
+        As of `run_provenance`.
+    """
+    words = {name: str(run[name]) for name in ('created', 'command') if run.get(name)}
+    version = run.get('versions', {}).get('nanorocks_ros')
+    return {'nanorocks_ros': str(version), **words} if version else words
 
 
 def _show_in_notebook(figure_type: type) -> None:

@@ -89,6 +89,24 @@ def write_parquet(
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 
+def read_parquet(path: Path) -> Any:
+    """The table of a file, as of pyarrow.
+
+    Raises
+    ------
+    ConfigurationError
+        When pyarrow is not installed.
+    OSError, ValueError
+        When the file cannot be read.
+    """
+    return _pyarrow('pyarrow.parquet', path).read_table(path)
+
+
+def read_parquet_schema(path: Path) -> Any:
+    """The columns of a file and what is told of them, as of pyarrow; raises as `read_parquet`."""
+    return _pyarrow('pyarrow.parquet', path).read_schema(path)
+
+
 def _groups(
     columns: Sequence[Column], pieces: Iterable[Mapping[str, NDArray[Any]]]
 ) -> Iterator[dict[str, NDArray[Any]]]:

@@ -85,6 +85,10 @@ class ClusterEstimate:
         Beads that meet more slowly stick: by the merges of this cycle so far, with an interval.
     mean_sticking_speed : Interval, [m/s]
         By all cycles before this one.
+    sticking_speed_lower_68, sticking_speed_upper_68 : float, [m/s]
+        Ends of the interval of `sticking_speed` with the probability `ONE_SIGMA`.
+    mean_sticking_speed_lower_68, mean_sticking_speed_upper_68 : float, [m/s]
+        The same of `mean_sticking_speed`.
     """
 
     stamp_ns: int
@@ -106,6 +110,10 @@ class ClusterEstimate:
     sticking_status: StickingStatus = StickingStatus.UNKNOWN
     sticking_speed: Interval = UNKNOWN_INTERVAL
     mean_sticking_speed: Interval = UNKNOWN_INTERVAL
+    sticking_speed_lower_68: float = UNKNOWN
+    sticking_speed_upper_68: float = UNKNOWN
+    mean_sticking_speed_lower_68: float = UNKNOWN
+    mean_sticking_speed_upper_68: float = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

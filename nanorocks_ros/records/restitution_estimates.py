@@ -112,6 +112,9 @@ class CorEstimate:
         Ends of the interval of `restitution` with the probability `ONE_SIGMA`.
     wall_restitution_lower_68, wall_restitution_upper_68 : float
         The same of `wall_restitution`.
+    restitution_exponent_lower_68, restitution_exponent_upper_68 : float
+    wall_restitution_exponent_lower_68, wall_restitution_exponent_upper_68 : float
+        The same of the exponents.
     """
 
     stamp_ns: int
@@ -160,3 +163,7 @@ class CorEstimate:
     restitution_upper_68: float = UNKNOWN
     wall_restitution_lower_68: float = UNKNOWN
     wall_restitution_upper_68: float = UNKNOWN
+    restitution_exponent_lower_68: float = UNKNOWN
+    restitution_exponent_upper_68: float = UNKNOWN
+    wall_restitution_exponent_lower_68: float = UNKNOWN
+    wall_restitution_exponent_upper_68: float = UNKNOWN

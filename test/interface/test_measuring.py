@@ -62,6 +62,31 @@ def test_results_lie_beside_the_film_and_are_taken_from_there(measured, film):
     assert again.contacts.equals(measured.contacts)
 
 
+def test_the_folder_is_read_as_it_was_measured(measured):
+    again = nr.read(measured.folder)
+    assert isinstance(again, nr.MeasureResult)
+    for name in measured.tables:
+        own, read = measured.table(name), again.table(name)
+        assert read.equals(own)
+        assert read.attrs['units'] == own.attrs['units']
+        assert set(own.attrs['units']) == set(own.columns)
+    # Only what the import of the film said is told once.
+    assert set(repr(again).splitlines()) <= set(repr(measured).splitlines())
+    assert again._summary().rows == measured._summary().rows
+    assert again.provenance['film'] == 'film.avi'
+    single = nr.read(measured.folder / 'tracks.csv')
+    assert single.table('tracks').equals(measured.tracks)
+    provenance = measured.contacts.attrs['provenance']
+    assert provenance['settings']['cooling.probability'] == measured.cor.attrs['probability']
+    assert 'film:' in provenance['trays_file']
+
+
+def test_a_run_that_was_interrupted_is_no_result(tmp_path):
+    (tmp_path / 'measured.json').write_text('{}')
+    with pytest.raises(nr.RecordingError, match=r'not complete.*again'):
+        nr.read(tmp_path)
+
+
 def test_the_summary_tells_what_is_missing_in_the_words_of_python(measured):
     text = repr(measured)
     assert 'decay: not read; it needs the container: corners, sides_mm' in text

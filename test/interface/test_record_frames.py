@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from nanorocks_ros.interface.record_frames import frame_of, in_px, joined, with_column
+from nanorocks_ros.interface.record_frames import frame_of, joined, with_column
 from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod
 from nanorocks_ros.studies.results.record_columns import columns_of
 
@@ -53,14 +52,3 @@ def test_joined_frames_keep_units_and_kinds():
     assert whole['cycle'].dtype == np.int64
     assert whole.attrs['units']['recording'] == ''
     assert whole.attrs['probability'] == 0.95
-
-
-def test_lengths_of_an_unknown_scale_are_in_px():
-    frame = frame_of(SpeedEstimate, [speed(1)], 0)
-    frame = with_column(with_column(frame, 0, 'mass', 1.0, 'kg'), 0, 'square', 2.0, 'm^2/s^2')
-    in_pixels = in_px(frame, 1000.0)
-    assert 'mass' not in in_pixels
-    assert in_pixels['mean_projected_speed_px'].item() == pytest.approx(100.0)
-    assert in_pixels['square_px'].item() == pytest.approx(2e6)
-    assert in_pixels.attrs['units']['square_px'] == 'px^2/s^2'
-    assert in_pixels.attrs['units']['time'] == 's'

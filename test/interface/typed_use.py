@@ -29,7 +29,7 @@ def analyse() -> None:
     assert_type(cycles, nr.AnalysisResult)
     assert_type(cycles.speeds, pd.DataFrame)
     assert_type(cycles.table('merge'), pd.DataFrame)
-    assert_type(nr.read('results'), nr.AnalysisResult)
+    assert_type(nr.read('results'), nr.AnalysisResult | nr.MeasureResult | nr.TablesResult)
 
 
 def simulate() -> None:

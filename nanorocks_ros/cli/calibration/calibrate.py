@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('recording', help='rosbag2 folder, .mcap file, video or folder of images')
     accept_films(parser, 'recording')
     parser.add_argument('-o', '--output', help='calibration file to write, YAML')
-    parser.add_argument('--picture', help='picture of the calibration to write, PNG')
+    parser.add_argument('--picture', help='picture of the calibration to write, PNG or .jpg')
     parser.add_argument(
         '--show', metavar='YAML', help='show this calibration instead of estimating one'
     )
@@ -55,12 +55,12 @@ def run(options: argparse.Namespace) -> int:
     from nanorocks_ros.experiment.calibration_file import load_calibration, write_calibration
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.outputs.photographs import write_photograph
     from nanorocks_ros.studies.analysis.bag_frames import BagFrames
     from nanorocks_ros.studies.calibration.camera_calibration import (
         calibrate,
         draw_calibration,
         median_image,
-        write_picture,
     )
 
     _check_options(options)
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         remark = f'nanorocks calibrate, from {Path(options.recording).name}'
         write_calibration(calibration, Path(options.output), remark)
     if options.picture:
-        write_picture(Path(options.picture), draw_calibration(picture, calibration))
+        write_photograph(Path(options.picture), draw_calibration(picture, calibration))
     if options.json:
         print(json.dumps(as_json(calibration, fit), allow_nan=False))
     else:

@@ -32,7 +32,9 @@ def add_parser(commands: Any) -> None:
     add_bag(parser)
     add_film_options(parser)
     parser.add_argument('-o', '--output', help='table of the tracks to write, .csv or .parquet')
-    parser.add_argument('--picture', help='picture of the last frame with tracks to write, .png')
+    parser.add_argument(
+        '--picture', help='picture of the last frame with tracks to write, .png or .jpg'
+    )
     parser.add_argument(
         '--compare',
         metavar='FILE',
@@ -85,11 +87,12 @@ def tracked_bag(options: argparse.Namespace) -> TrackedBag:
 def _check_outputs(options: argparse.Namespace) -> None:
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.outputs.parquet import check_parquet
+    from nanorocks_ros.outputs.photographs import PHOTOGRAPHS
     from nanorocks_ros.studies.analysis.tracks_files import TABLES
 
     names = {'--output': options.output, '--picture': options.picture}
     files = {flag: Path(name) for flag, name in names.items() if name}
-    check_outputs(files, {'--output': TABLES, '--picture': ('.png',)}, force=options.force)
+    check_outputs(files, {'--output': TABLES, '--picture': PHOTOGRAPHS}, force=options.force)
     if options.output:
         check_parquet(Path(options.output))
 

@@ -76,6 +76,7 @@ def film_scene(options: argparse.Namespace) -> int:
 
 def _files(options: argparse.Namespace) -> dict[str, Path]:
     from nanorocks_ros.outputs.atomic_files import check_outputs
+    from nanorocks_ros.outputs.photographs import PHOTOGRAPHS
     from nanorocks_ros.studies.synthetic.film_video import VIDEOS, check_video
 
     for name in _TRAY_FLAGS:
@@ -92,7 +93,7 @@ def _files(options: argparse.Namespace) -> dict[str, Path]:
         raise ConfigurationError('--scene', 'has no output', 'name a --bag, --video or --picture')
     check_outputs(
         {f'--{name}': path for name, path in files.items()},
-        {'--picture': ('.png',), '--video': VIDEOS},
+        {'--picture': PHOTOGRAPHS, '--video': VIDEOS},
         force=options.force,
     )
     if 'video' in files:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import add
 from statistics import NormalDist
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.numerics.log_sums import log_sum
-from nanorocks_ros.records import StickingStatus
+from nanorocks_ros.records import ONE_SIGMA, StickingStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,15 +42,19 @@ class StickingEstimate:
     lower, upper : float, [m/s]
         Interval. Without a merge it runs from 0 to an upper limit; if all colliding bodies stuck,
         from a lower limit to the highest speed of the grid.
+    lower_68, upper_68 : float, [m/s]
+        The same with the probability `ONE_SIGMA`.
     merges : int
     probability : float, 0 to 1
-        Of the interval.
+        Of `lower` and `upper`.
     """
 
     status: StickingStatus
     sticking_speed: float
     lower: float
     upper: float
+    lower_68: float
+    upper_68: float
     merges: int
     probability: float
 
@@ -134,34 +138,58 @@ def _posterior(
 ) -> StickingEstimate:
     weights = np.exp(likelihood - likelihood.max()) * np.gradient(grid)
     total = np.cumsum(weights)
-    total /= total[-1]
-    tail = 0.5 * (1.0 - probability)
-    quantiles = (tail, 0.5, 1.0 - tail, probability)
-    low, median, high, limit = (float(value) for value in np.interp(quantiles, total, grid))
-    # What an interval from both sides leaves at either end.
-    drop = 0.5 * NormalDist().inv_cdf(1.0 - tail) ** 2
+    posterior = _Posterior(grid=grid, likelihood=likelihood, total=total / total[-1])
     if merges == 0:
-        status, low, median, high = StickingStatus.NO_MERGE, 0.0, math.nan, limit
-    elif likelihood[-1] > likelihood.max() - drop:
+        status = StickingStatus.NO_MERGE
+    elif likelihood[-1] > likelihood.max() - _drop(probability):
         # All colliding bodies stuck: any higher speed fits as well.
+        status = StickingStatus.NO_UPPER_LIMIT
+    else:
+        status = StickingStatus.MEASURED
+    measured = status is StickingStatus.MEASURED
+    low, high = posterior.interval(status, probability)
+    narrow_low, narrow_high = posterior.interval(status, ONE_SIGMA)
+    return StickingEstimate(
+        status=status,
+        sticking_speed=posterior.quantile(0.5) if measured else math.nan,
+        lower=low,
+        upper=high,
+        lower_68=narrow_low,
+        upper_68=narrow_high,
+        merges=merges,
+        probability=probability,
+    )
+
+
+class _Posterior(NamedTuple):
+    """Sticking speeds, log likelihood of each, and probability of all up to it, (n,) each."""
+
+    grid: NDArray[np.float64]
+    likelihood: NDArray[np.float64]
+    total: NDArray[np.float64]
+
+    def quantile(self, probability: float) -> float:
+        """The speed below which the sticking speed is with a probability."""
+        return float(np.interp(probability, self.total, self.grid))
+
+    def interval(self, status: StickingStatus, probability: float) -> tuple[float, float]:
+        """From both sides where the speed is measured, else from one."""
+        tail = 0.5 * (1.0 - probability)
+        if status is StickingStatus.NO_MERGE:
+            return 0.0, self.quantile(probability)
+        if status is StickingStatus.MEASURED:
+            return self.quantile(tail), self.quantile(1.0 - tail)
         # The flat prior up to the highest speed would raise the quantile: the likelihood alone
         # gives the lower limit, half the square of a normal deviate below its maximum. The
         # deviate is that of an interval from both sides: whether there is an upper limit is
         # known from the same merges, which are the more frequent ones if there is none.
-        likely = grid[likelihood >= likelihood.max() - drop]
-        low = min(low, float(likely[0]))
-        status, median = StickingStatus.NO_UPPER_LIMIT, math.nan
-        high = float(grid[-1])
-    else:
-        status = StickingStatus.MEASURED
-    return StickingEstimate(
-        status=status,
-        sticking_speed=median,
-        lower=low,
-        upper=high,
-        merges=merges,
-        probability=probability,
-    )
+        likely = self.grid[self.likelihood >= self.likelihood.max() - _drop(probability)]
+        return min(self.quantile(tail), float(likely[0])), float(self.grid[-1])
+
+
+def _drop(probability: float) -> float:
+    """What an interval from both sides leaves of the log likelihood at either end."""
+    return 0.5 * NormalDist().inv_cdf(0.5 + 0.5 * probability) ** 2
 
 
 def _nothing(
@@ -172,6 +200,8 @@ def _nothing(
         sticking_speed=math.nan,
         lower=0.0,
         upper=highest,
+        lower_68=0.0,
+        upper_68=highest,
         merges=merges,
         probability=probability,
     )

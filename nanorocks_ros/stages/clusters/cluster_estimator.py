@@ -163,11 +163,15 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
                 'sticking_speed': Interval(
                     of_cycle.sticking_speed, of_cycle.lower, of_cycle.upper
                 ),
+                'sticking_speed_lower_68': of_cycle.lower_68,
+                'sticking_speed_upper_68': of_cycle.upper_68,
             }
         of_all = self._sticking.of_all(cycle, stamp_ns)
         if of_all is not None:
             fields |= {
                 'mean_sticking_speed': Interval(of_all.sticking_speed, of_all.lower, of_all.upper),
+                'mean_sticking_speed_lower_68': of_all.lower_68,
+                'mean_sticking_speed_upper_68': of_all.upper_68,
             }
         weighted_size = fields.get('weighted_size', UNKNOWN_MEASURED)
         estimate = self._with_offset(estimate, weighted_size)

@@ -51,6 +51,8 @@ class CycleRestitution:
     impact_restitution, wall_impact_restitution : Interval
     restitution_lower_68, restitution_upper_68 : float
     wall_restitution_lower_68, wall_restitution_upper_68 : float
+    restitution_exponent_lower_68, restitution_exponent_upper_68 : float
+    wall_restitution_exponent_lower_68, wall_restitution_exponent_upper_68 : float
     speed_dependent : bool
         Whether an exponent is not 0, so that neither the decay nor a constant restitution holds.
     """
@@ -90,4 +92,8 @@ class CycleRestitution:
     restitution_upper_68: float = UNKNOWN
     wall_restitution_lower_68: float = UNKNOWN
     wall_restitution_upper_68: float = UNKNOWN
+    restitution_exponent_lower_68: float = UNKNOWN
+    restitution_exponent_upper_68: float = UNKNOWN
+    wall_restitution_exponent_lower_68: float = UNKNOWN
+    wall_restitution_exponent_upper_68: float = UNKNOWN
     speed_dependent: bool = False

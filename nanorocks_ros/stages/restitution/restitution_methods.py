@@ -270,7 +270,7 @@ class DecayLibraryMethod:
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
             acceleration=losses.magnitude(self._probability),
             accelerated=accelerated,
-            **dependence.fields(self._ends),
+            **dependence.fields(self._ends, _NARROW),
         )
         result = _determined(result, sources, self._ends)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
@@ -374,18 +374,23 @@ class DecayLibraryMethod:
             MeasuredInterval(mean.value, mean.error, interval.lower, interval.upper)
             for mean, interval in zip(means, intervals, strict=True)
         )
+        narrow, narrow_walls = sources.intervals(_NARROW)
         return MeanRestitution(
             cycles=evidence.cycles,
             by_contacts=evidence.by_contacts,
             restitution=restitution,
+            restitution_lower_68=narrow.lower,
+            restitution_upper_68=narrow.upper,
             wall_restitution=wall_restitution,
+            wall_restitution_lower_68=narrow_walls.lower,
+            wall_restitution_upper_68=narrow_walls.upper,
             tension=sources.joint.tension,
             rebounds=contacts.rebounds,
             collisions=contacts.collisions,
             headline=sources.headline,
             wall_friction=sources.wall_friction,
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
-            **dependence.fields(self._ends),
+            **dependence.fields(self._ends, _NARROW),
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> CycleRestitution:

@@ -225,6 +225,8 @@ def _clusters_as_json(last: ClusterEstimate | None) -> dict[str, Any]:
         'sticking_speed': finite_or_none(last.sticking_speed.value),
         'sticking_speed_lower': finite_or_none(last.sticking_speed.lower),
         'sticking_speed_upper': finite_or_none(last.sticking_speed.upper),
+        'sticking_speed_lower_68': finite_or_none(last.sticking_speed_lower_68),
+        'sticking_speed_upper_68': finite_or_none(last.sticking_speed_upper_68),
     }
 
 

@@ -6,7 +6,7 @@ Tested by ``test/interface/test_analysis.py``.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
@@ -38,11 +38,14 @@ class ReadAnalysis(NamedTuple):
         Without the stamps of frames and what is only known during the analysis. There is evidence
         of the cycles where a batch has kept it.
     settings : PipelineSettings
+    run : dict
+        Command, date and versions of the analysis, as of `run_provenance`.
     """
 
     source: str
     analysis: Analysis
     settings: PipelineSettings
+    run: dict[str, Any]
 
 
 def read_analysis(folder: Path) -> ReadAnalysis:
@@ -90,7 +93,7 @@ def read_analysis(folder: Path) -> ReadAnalysis:
         include_inconsistent=settings.cooling.include_inconsistent,
         prior=settings.prior,
     )
-    return ReadAnalysis(provenance.source or folder.name, analysis, settings)
+    return ReadAnalysis(provenance.source or folder.name, analysis, settings, provenance.run)
 
 
 def _evidence(folder: Path, trays: Mapping[int, object]) -> dict[int, CycleLikelihoods]:

@@ -71,7 +71,7 @@ def columns_of(tracked: TrackedBag) -> tuple[Column, ...]:
     return (*(column for column in COLUMNS if column.name not in _LENGTHS), *_PX_COLUMNS)
 
 
-def write_tracks(path: Path, tracked: TrackedBag) -> None:
+def write_tracks(path: Path, tracked: TrackedBag, *, described: bool = True) -> None:
     """Write the tracks of every tray, frame by frame.
 
     Parameters
@@ -79,6 +79,8 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     path : Path
         ``.csv`` or ``.parquet``; a file there is replaced, once the new one is complete.
     tracked : TrackedBag
+    described : bool
+        Whether a CSV table gets a description of its own, and not that of its folder.
 
     Raises
     ------
@@ -90,7 +92,8 @@ def write_tracks(path: Path, tracked: TrackedBag) -> None:
     pieces = track_pieces(tracked)
     if path.suffix == '.csv':
         pieces = (_rounded(piece) for piece in pieces)
-    write_table(path, columns_of(tracked), pieces, _provenance(tracked))
+    columns = columns_of(tracked)
+    write_table(path, columns, pieces, _provenance(tracked), described=described)
 
 
 def track_pieces(tracked: TrackedBag) -> Iterator[dict[str, NDArray[Any]]]:

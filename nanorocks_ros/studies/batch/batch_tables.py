@@ -43,6 +43,7 @@ _FROM_COR = (
 _FROM_CLUSTERS = (
     *('bodies', 'bodies_error', 'onset', 'sticking_status'),
     *('sticking_speed', 'sticking_speed_lower', 'sticking_speed_upper'),
+    *('sticking_speed_lower_68', 'sticking_speed_upper_68'),
 )
 _WORDS = 'headline', 'sticking_status'
 _COUNTS = 'recordings', 'cycles', 'cycles_read', 'decays_left_out', 'rebounds', 'collisions'

@@ -321,7 +321,9 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
     wall_restitution = mean.wall_restitution if mean else UNKNOWN_MEASURED_INTERVAL
     fields_of_tray |= {
         **_interval_as_json('restitution', restitution),
+        **_narrow_as_json('restitution', mean),
         **_interval_as_json('wall_restitution', wall_restitution),
+        **_narrow_as_json('wall_restitution', mean),
         'cycles_read': mean.cycles if mean else 0,
         'decays_left_out': tray.left_out,
         'headline': mean.headline.name.lower() if mean else None,
@@ -339,6 +341,8 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
         'sticking_speed': finite_or_none(sticking.sticking_speed) if sticking else None,
         'sticking_speed_lower': finite_or_none(sticking.lower) if sticking else None,
         'sticking_speed_upper': finite_or_none(sticking.upper) if sticking else None,
+        'sticking_speed_lower_68': finite_or_none(sticking.lower_68) if sticking else None,
+        'sticking_speed_upper_68': finite_or_none(sticking.upper_68) if sticking else None,
         'merges': sticking.merges if sticking else None,
     }
     for name, value in tray.means.items():
@@ -364,7 +368,14 @@ def _exponents_as_json(mean: MeanRestitution | None) -> dict[str, float | None]:
                 f'{name}_lower': finite_or_none(interval.lower),
                 f'{name}_upper': finite_or_none(interval.upper),
             }
+        values |= _narrow_as_json(f'{prefix}restitution_exponent', mean)
     return values
+
+
+def _narrow_as_json(name: str, mean: MeanRestitution | None) -> dict[str, float | None]:
+    """Ends of the interval of 68 %."""
+    names = f'{name}_lower_68', f'{name}_upper_68'
+    return {end: finite_or_none(getattr(mean, end)) if mean else None for end in names}
 
 
 def _interval_as_json(name: str, quantity: MeasuredInterval) -> dict[str, float | None]:

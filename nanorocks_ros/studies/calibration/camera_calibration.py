@@ -16,7 +16,6 @@ from nanorocks_ros.studies.calibration.plate_fit import PlateFit, fit_plate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -166,22 +165,6 @@ def _draw_scale(canvas: NDArray[np.uint8], scale: float) -> None:
     cv2.line(canvas, start, (start[0] + length, start[1]), _WHITE, 2)
     text = f'10 mm, {scale / 1e3:.2f} px/mm'
     cv2.putText(canvas, text, (start[0], start[1] - 10), 0, 0.6, _WHITE, 1, cv2.LINE_AA)
-
-
-def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
-    """Write an image; the suffix gives the format.
-
-    Raises
-    ------
-    RecordingError
-        When it cannot be written.
-    """
-    try:
-        done = cv2.imwrite(str(path), picture)
-    except cv2.error:
-        done = False
-    if not done:
-        raise RecordingError(str(path), 'cannot be written', 'name a .png in a folder that exists')
 
 
 def max_distortion_px(calibration: Calibration) -> float:

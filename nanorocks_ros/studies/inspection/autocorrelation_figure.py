@@ -59,7 +59,7 @@ def autocorrelation_figure(path: Path, clusters: BagClusters, pixels_per_metre: 
     with figure_file(path, TWO_COLUMNS, _HEIGHT * len(clusters.trays)) as figure:
         parts = figure.subfigures(len(clusters.trays), 1, squeeze=False)[:, 0]
         for part, (number, tray) in zip(parts, clusters.trays.items(), strict=True):
-            left, right = part.subfigures(1, 2, width_ratios=(1, 1))
+            left, right = part.subfigures(1, 2, width_ratios=(11, 9))
             pairs = left.subplots(2, 2, squeeze=False)
             ends = tray.snapshots[0], tray.snapshots[-1]
             for row, snapshot in zip(pairs, ends, strict=True):
@@ -73,6 +73,7 @@ def _draw_snapshot(row: NDArray[np.object_], snapshot: Snapshot, scale: float) -
     half = 0.5 * _MM * width / scale, 0.5 * _MM * height / scale
     row[0].imshow(snapshot.gray, cmap='gray', extent=(0, 2 * half[0], 2 * half[1], 0))
     row[0].set_title(f'{snapshot.since:.1f} s after shaking')
+    row[0].set_xlabel('x [mm]')
     row[0].set_ylabel('y [mm]')
     rows, columns = snapshot.values.shape
     step = 2 * half[0] / columns, 2 * half[1] / rows
@@ -85,7 +86,8 @@ def _draw_snapshot(row: NDArray[np.object_], snapshot: Snapshot, scale: float) -
     row[1].set_xlim(-reach, reach)
     row[1].set_ylim(reach, -reach)
     row[1].set_title('autocorrelation')
-    row[1].set_xlabel('shift [mm]')
+    row[1].set_xlabel('shift in x [mm]')
+    row[1].set_ylabel('in y [mm]')
 
 
 def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
@@ -97,13 +99,13 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
         axes.plot(*tray.truth[:, :2].T, color=TRUTH, lw=3.5, alpha=0.7, label='true')
     finite = np.isfinite(lower).tolist()
     axes.fill_between(times, lower, upper, where=finite, color=MEASURED, alpha=0.2, lw=0)
-    label = 'by simulated clusters, band of 68 %'
+    label = 'measured, band of 68 %'
     axes.plot(times, size, '.-', ms=3, lw=0.8, color=MEASURED, label=label)
     paper = tray.paper_sizes()
-    label = f"paper's line to the {tray.counted():.1f} beads per cluster at the end"
+    label = f"paper's line, {tray.counted():.0f} beads at the end"
     axes.plot(times, paper, color=VERMILION, lw=1.0, ls='--', label=label)
     for onset, colour, text in (
-        (tray.paper_onset(), VERMILION, "onset by the paper's rule"),
+        (tray.paper_onset(), VERMILION, "paper's onset"),
         (tray.true_onset(), TRUTH, 'first beads stick'),
     ):
         if math.isfinite(onset):
@@ -114,6 +116,6 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
     axes.set_yscale('log')
     plain_numbers(axes.yaxis)
     axes.set_xlabel('time since the shaking event [s]')
-    axes.set_ylabel('weight-averaged cluster size [beads]')
+    axes.set_ylabel('cluster size, mean over beads [beads]')
     axes.legend(loc='upper left')
     axes.grid(alpha=0.25, which='major')

@@ -75,7 +75,8 @@ def speeds_figure(path: Path, bag_speeds: BagSpeeds, cycle: int) -> None:
         since = 'since the shaking event' if cycle else 'since the beginning'
         for axes in rows[-1]:
             axes.set_xlabel(f'time {since} [s]')
-        rows[0, 0].legend()
+        lines, names = rows[0, 0].get_legend_handles_labels()
+        figure.legend(lines, names, loc='outside upper left', ncols=len(names))
 
 
 def _start_ns(bag_speeds: BagSpeeds, cycle: int) -> int:

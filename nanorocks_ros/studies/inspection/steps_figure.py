@@ -29,7 +29,7 @@ _COLUMNS = 4
 # Height of the title of a panel and of the headline of a tray, [mm].
 _TITLE, _HEADLINE = 10.0, 8.0
 # Letters of a line of a title.
-_TITLE_WIDTH = 34
+_TITLE_WIDTH = 30
 _MM, _MM2 = 1e3, 1e6
 _EDGE = YELLOW
 _AVERAGES = {
@@ -110,7 +110,7 @@ def _displacement_text(steps: TraySteps) -> str:
     shift = np.array(steps.image.displacement) * steps.pixels_per_metre
     if np.isnan(shift).any():
         return 'tray displacement unknown'
-    return f'tray displaced by {shift[0]:+.2f}, {shift[1]:+.2f} px'
+    return f'tray displaced by {shift[0]:+.2f}, {shift[1]:+.2f} px'.replace('-', '−')
 
 
 def _tracked_counts(steps: TraySteps) -> str:
@@ -127,11 +127,8 @@ def _tracked_counts(steps: TraySteps) -> str:
 
 def _mask_title(steps: TraySteps, settings: SpeedSettings) -> str:
     if steps.moving_area is None:
-        return 'binarised: too few frames since the beginning or the shaking event'
-    return (
-        f'despeckled, over {settings.threshold:g} sigma: {_MM2 * steps.moving_area:.1f} mm$^2$ '
-        'moving'
-    )
+        return 'moving: too few frames so far'
+    return f'moving, above {settings.threshold:g} sigma: {_MM2 * steps.moving_area:.1f} mm²'
 
 
 def _draw_raw(axes: Axes, steps: TraySteps) -> None:

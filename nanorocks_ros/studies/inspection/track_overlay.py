@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.atomic_files import atomic_file
+from nanorocks_ros.outputs.photographs import write_photograph
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,7 +105,7 @@ def with_scale_bar(picture: NDArray[np.uint8], pixels_per_metre: float) -> NDArr
 
 
 def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
-    """Write several overlays, stacked vertically, as a PNG.
+    """Write several overlays, stacked vertically, as PNG or JPEG.
 
     Raises
     ------
@@ -118,11 +117,7 @@ def write_overlay(path: Path, pictures: Sequence[NDArray[np.uint8]]) -> None:
         cv2.copyMakeBorder(picture, 0, _GAP_PX, 0, width - picture.shape[1], cv2.BORDER_CONSTANT)
         for picture in pictures
     ]
-    encoded, content = cv2.imencode('.png', np.vstack(parts)[:-_GAP_PX])
-    if not encoded:
-        raise RecordingError(str(path), 'the image cannot be encoded', 'name a .png file')
-    with atomic_file(path) as file:
-        file.write_bytes(content.tobytes())
+    write_photograph(path, np.vstack(parts)[:-_GAP_PX].astype(np.uint8, copy=False))
 
 
 def _colour(number: int) -> tuple[int, int, int]:

@@ -17,15 +17,13 @@ from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
 from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
-from nanorocks_ros.studies.measure.measure_report import (
-    DECAY_NOT_READ,
-    MeasuredTray,
-    write_measure_report,
-)
+from nanorocks_ros.studies.measure.measure_report import write_measure_report
+from nanorocks_ros.studies.measure.measured_folder import TRACKS, prepare_folder, write_measured
+from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ, MeasuredTray
 from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
-from nanorocks_ros.studies.measure.track_speeds import track_speeds, write_speeds
+from nanorocks_ros.studies.measure.track_speeds import track_speeds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,10 +38,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
-MARK = 'measured.json'
-"""File of a folder of results; it marks the folder, and holds the numbers."""
-
-_TRACKS, _TABLE, _PICTURE = 'tracks.npz', 'tracks.csv', 'tracks.png'
+_TRACKS, _PICTURE = 'tracks.npz', 'tracks.png'
 _MAGNIFICATION = 2
 
 
@@ -106,28 +101,6 @@ class Measured:
     tracked: TrackedBag
 
 
-def check_measure_folder(folder: Path) -> None:
-    """Make the folder of results.
-
-    Raises
-    ------
-    RecordingError
-        When it holds something else, or cannot be made.
-    """
-    if folder.exists() and not (folder / MARK).exists() and any(folder.iterdir()):
-        raise RecordingError(
-            str(folder), 'exists and holds no results of `nanorocks measure`', 'pass another -o'
-        )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(
-            str(folder), f'cannot be written ({error.strerror})', 'pass another -o'
-        ) from error
-    if not (folder / MARK).exists():
-        write_bytes(folder / MARK, b'{}\n')
-
-
 def measure_film(plan: MeasurePlan, teller: Teller) -> Measured:
     """Measure a film, step by step.
 
@@ -140,13 +113,11 @@ def measure_film(plan: MeasurePlan, teller: Teller) -> Measured:
     FrameError
         When no frame can be used.
     """
-    check_measure_folder(plan.folder)
+    prepare_folder(plan.folder)
     tracked = _tracked(plan, teller)
     trays = tuple(_measured_tray(plan, tracked, number, teller) for number in tracked.trays)
     report = plan.folder / 'report.html'
-    values = {str(tray.number): tray.as_json() for tray in trays}
-    content = {'film': plan.name, 'usable': tracked.usable, 'trays': values}
-    write_bytes(plan.folder / MARK, (json.dumps(content, indent=1) + '\n').encode())
+    write_measured(plan.folder, plan.name, tracked, trays, plan.settings)
     write_measure_report(report, plan.name, tracked, trays, plan.folder / _PICTURE)
     return Measured(trays=trays, usable=tracked.usable, report=report, tracked=tracked)
 
@@ -165,7 +136,7 @@ def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
         )
     for notice in tracked.notices:
         teller.say(notice)
-    write_tracks(plan.folder / _TABLE, tracked)
+    write_tracks(plan.folder / TRACKS, tracked, described=False)
     write_overlay(plan.folder / _PICTURE, _pictures(plan, tracked))
     save_tracks(archive, tracked, key)
     return tracked
@@ -203,7 +174,6 @@ def _measured_tray(
         for line in verdict.lines():
             teller.say(line)
     speeds = track_speeds(records)
-    write_speeds(plan.folder / f'tray_{number}_mean_speeds.csv', speeds)
     with teller.progress('contacts') as progress:
         contacts = track_contacts(
             records, tray, plan.settings, container_known=known, progress=progress

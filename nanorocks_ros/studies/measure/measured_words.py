@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.outputs.html_report import number, with_interval
 from nanorocks_ros.outputs.safe_text import counted
-from nanorocks_ros.studies.measure.track_contacts import WALL_NAMES
+from nanorocks_ros.studies.results.contact_columns import WALL_NAMES
 
 if TYPE_CHECKING:
     from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
@@ -92,6 +92,13 @@ def wall_name(contacts: TrackContacts, wall: int) -> str:
     down = (x, y)[axis] * (1.0 if high else -1.0)
     along = abs((x, y)[axis]) > abs((x, y)[1 - axis])
     return 'floor' if down > 0.0 and along else f'{WALL_NAMES[wall]} wall'
+
+
+def restitutions(contacts: TrackContacts) -> dict[str, RestitutionOfContacts]:
+    """What the contacts say of beads, of all walls, and of each wall, by name."""
+    alone = contacts.alone
+    walls = {wall_name(contacts, wall): value for wall, value in alone.by_wall.items()}
+    return {'beads': alone.beads, 'walls': alone.walls, **walls}
 
 
 def restitution_text(value: RestitutionOfContacts, unit: LengthUnit) -> str:

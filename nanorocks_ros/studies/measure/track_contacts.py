@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Tracks
     from nanorocks_ros.settings import PipelineSettings
 
-WALL_NAMES = 'left', 'right', 'top', 'bottom'
-"""Of the walls 0 to 3, as they lie in the picture."""
-
 # A wall that is not seen lies so many diameters beyond all beads.
 _BEYOND = 10.0
 

@@ -11,12 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_rows
-from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -27,12 +24,14 @@ _BINS = 200
 _LEAST_FRAMES = 3
 # Part of the film at each end whose speeds are told.
 _END = 0.05
-COLUMNS = (
+SPEED_COLUMNS = (
+    Column(name='tray', kind='int64', unit='1', doc='number of the tray'),
     Column(name='time', unit='s', doc='middle of the bin, since the first frame'),
     Column(name='mean_speed', unit='m/s', doc='mean projected speed of the beads'),
     Column(name='rms_speed', unit='m/s', doc='root mean square of the projected speed'),
     Column(name='beads', unit='1', doc='mean number of beads with a known speed'),
 )
+"""Columns of the table of a tray."""
 
 
 class TrackSpeeds(NamedTuple):
@@ -78,15 +77,3 @@ def _bin(tracks: Sequence[Tracks], first_ns: int) -> tuple[float, float, float, 
         return time, math.nan, math.nan, 0.0
     rms = math.sqrt(float(np.mean(speeds**2)))
     return time, float(speeds.mean()), rms, speeds.size / len(tracks)
-
-
-def write_speeds(path: Path, speeds: TrackSpeeds) -> None:
-    """Write the speeds as a table.
-
-    Raises
-    ------
-    RecordingError
-        When it cannot be written.
-    """
-    rows = np.column_stack(speeds).tolist()
-    write_rows(path, COLUMNS, rows, run_provenance())

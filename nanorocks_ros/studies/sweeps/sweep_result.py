@@ -157,6 +157,14 @@ class Sweep:
             for k, time in enumerate(self.times.tolist()):
                 yield (*values, time, *(float(curve[index][k]) for curve in curves))
 
+    def columns(self, units: dict[str, str]) -> tuple[Column, ...]:
+        """Columns of `rows`; units of the axes that have one."""
+        curves = ['time', *CURVES]
+        return (
+            *(_axis_column(axis, units.get(axis.name) or '1') for axis in self.axes),
+            *float_columns(curves, ['s', *('m/s' for _ in CURVES)]),
+        )
+
     def write_table(self, path: Path, units: dict[str, str]) -> None:
         """Write the curves as a CSV table, complete or not at all.
 
@@ -171,10 +179,5 @@ class Sweep:
         RecordingError
             When the file cannot be written.
         """
-        curves = ['time', *CURVES]
-        columns = [
-            *(_axis_column(axis, units.get(axis.name) or '1') for axis in self.axes),
-            *float_columns(curves, ['s', *('m/s' for _ in CURVES)]),
-        ]
         provenance = {**run_provenance(), 'sweep': parse_object(self.specification)}
-        write_rows(path, columns, self.rows(), provenance)
+        write_rows(path, self.columns(units), self.rows(), provenance)

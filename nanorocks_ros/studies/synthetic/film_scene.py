@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import cv2
-
 from nanorocks_ros import __version__
 from nanorocks_ros.experiment.recorded_experiment import experiment_metadata
-from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.photographs import write_photograph
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import (
@@ -101,8 +99,7 @@ class SceneRecorder:
             When the picture cannot be written.
         """
         moment = self._film().at(self.frames - 1, START_NS)
-        _, content = cv2.imencode('.png', moment.frame.image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
-        write_bytes(path, content.tobytes())
+        write_photograph(path, moment.frame.image)
 
     def into_video(
         self, path: Path, progress: Progress, quality: VideoQuality | None = None

@@ -14,7 +14,14 @@ from nanorocks_ros.studies.batch.batch_tables import cycle_columns
 from nanorocks_ros.studies.gas_statistics.statistics_files import TABLES as STATISTICS
 from nanorocks_ros.studies.inspection.autocorrelations import COLUMNS as AUTOCORRELATIONS
 from nanorocks_ros.studies.inspection.speed_comparison import COLUMNS as SPEEDS
-from nanorocks_ros.studies.measure.track_speeds import COLUMNS as MEAN_SPEEDS
+from nanorocks_ros.studies.measure.measure_tables import (
+    CONTACTS,
+    MEAN_SPEEDS,
+    RESTITUTION_COLUMNS,
+    RESTITUTIONS,
+)
+from nanorocks_ros.studies.measure.track_speeds import SPEED_COLUMNS
+from nanorocks_ros.studies.results.contact_columns import CONTACT_COLUMNS
 from nanorocks_ros.studies.results.record_columns import columns_of
 from nanorocks_ros.studies.synthetic.trajectory import EVENT_COLUMNS
 from nanorocks_ros.wire.array_layouts import layout
@@ -97,8 +104,16 @@ def _sections() -> Iterator[str]:
         'the scale is not known.\n'
     )
     yield _table(TRACKS)
-    yield '### `tray_K_mean_speeds.csv`\n'
-    yield _table(MEAN_SPEEDS)
+    yield '## `nanorocks measure`\n'
+    yield 'Of a film of which no length is told, lengths are in px, and columns are `X_px`.\n'
+    measured: dict[str, tuple[Column, ...]] = {
+        MEAN_SPEEDS: SPEED_COLUMNS,
+        CONTACTS: CONTACT_COLUMNS,
+        RESTITUTIONS: RESTITUTION_COLUMNS,
+    }
+    for name, columns in measured.items():
+        yield f'### `tray_K_{name}.csv`\n'
+        yield _table(columns)
     yield '## `nanorocks speeds --table`\n'
     yield _table(SPEEDS)
     yield '## `nanorocks autocorrelation --table`\n'

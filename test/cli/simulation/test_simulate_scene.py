@@ -105,7 +105,7 @@ def test_single_effects_can_be_added_to_none(capsys, tmp_path):
         (['--scene', '--bag', 'b', '--compression-codec', 'av1'], 2, 'is none of jpeg, jpeg_rate'),
         (['--scene', '--effects', 'drawn', '--bag', 'b'], 2, 'not over 8; add --scene-trays 1'),
         (['--effects', 'drawn', '--bag', 'b'], 2, 'add --scene --scene-trays 1'),
-        (['--scene', '--picture', 'scene.pdf'], 2, 'scene.pdf ends in none of .png'),
+        (['--scene', '--picture', 'scene.pdf'], 2, 'scene.pdf ends in none of .png, .jpg'),
         (
             ['--scene', '--bag', 'b', '--width-px', '300'],
             2,

@@ -13,7 +13,7 @@ from nanorocks_ros.inference.sticking.merge_likelihood import MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.physics.sticking_rates import slow_contacts
-from nanorocks_ros.records import Merge, StickingStatus
+from nanorocks_ros.records import ONE_SIGMA, Merge, StickingStatus
 
 BEADS = 15
 CONTACTS = slow_contacts(load_trays()[1])
@@ -33,6 +33,12 @@ def _cycle(rng, sticking_speed, measure='normal'):
             merges.append(TIMES[k])
             left -= 1
     return StickingCycle(times=TIMES, speeds=SPEEDS, bodies=bodies, merges=np.array(merges))
+
+
+# Without a merge.
+EMPTY = StickingCycle(
+    times=TIMES, speeds=SPEEDS, bodies=np.full(TIMES.size, 15.0), merges=np.empty(0)
+)
 
 
 @pytest.mark.parametrize('measure', ['normal', 'total'])
@@ -69,11 +75,18 @@ def test_many_cycles_narrow_the_interval_down_to_the_error_of_the_theory():
     assert many.lower < 3e-3 < many.upper
 
 
+def test_the_interval_of_68_percent_is_the_one_that_is_asked_for_by_that_probability():
+    rng = np.random.default_rng(2)
+    for cycle in (_cycle(rng, 3e-3), _cycle(rng, 1.0), EMPTY):
+        wide = sticking_estimate([cycle], CONTACTS, BEADS)
+        narrow = sticking_estimate([cycle], CONTACTS, BEADS, probability=ONE_SIGMA)
+        assert (wide.lower_68, wide.upper_68) == (narrow.lower, narrow.upper)
+        assert wide.lower <= wide.lower_68 < wide.upper_68 <= wide.upper
+        assert wide.upper_68 - wide.lower_68 < wide.upper - wide.lower
+
+
 def test_without_a_merge_there_is_an_upper_limit_that_falls_with_more_cycles():
-    cycle = StickingCycle(
-        times=TIMES, speeds=SPEEDS, bodies=np.full(TIMES.size, 15.0), merges=np.empty(0)
-    )
-    single, many = (sticking_estimate([cycle] * n, CONTACTS, BEADS) for n in (1, 9))
+    single, many = (sticking_estimate([EMPTY] * n, CONTACTS, BEADS) for n in (1, 9))
     assert single.status is many.status is StickingStatus.NO_MERGE
     assert math.isnan(single.sticking_speed)
     assert single.lower == many.lower == 0.0

@@ -417,6 +417,14 @@ def test_walls_whose_restitution_depends_on_speed_are_flagged():
     assert final.quality & Quality.SPEED_DEPENDENT
     assert final.headline is Headline.CONTACTS
     assert final.wall_restitution_exponent.lower < 1.0 < final.wall_restitution_exponent.upper
+    outer, inner = (
+        final.wall_restitution_exponent,
+        (
+            final.wall_restitution_exponent_lower_68,
+            final.wall_restitution_exponent_upper_68,
+        ),
+    )
+    assert outer.lower < inner[0] < outer.value < inner[1] < outer.upper
     assert final.wall_impact_speed == pytest.approx(2.3e-3, rel=0.1)
     truth = 1.0 - 0.1 * final.wall_impact_speed / 2e-3
     assert final.wall_impact_restitution.lower < truth < final.wall_impact_restitution.upper

@@ -152,6 +152,8 @@ def test_each_bag_has_the_results_it_has_alone_and_a_tray_what_all_cycles_say(do
     cycles = [cycle for bag in report['bags'] for cycle in bag['trays']['1']['cycles']]
     assert tray['cycles'] == len(cycles) >= tray['cycles_read'] == 2
     assert tray['restitution_lower'] < 0.89 < tray['restitution_upper']
+    inner = [tray[f'restitution{end}'] for end in ('_lower_68', '', '_upper_68')]
+    assert tray['restitution_lower'] < inner[0] < inner[1] < inner[2] < tray['restitution_upper']
     widths = [cycle['restitution_upper'] - cycle['restitution_lower'] for cycle in cycles]
     narrow_widths = [width for width in widths if width < 1.0]
     assert tray['restitution_upper'] - tray['restitution_lower'] < max(narrow_widths)

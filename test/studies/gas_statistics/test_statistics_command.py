@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+import nanorocks_ros as nr
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.outputs.table_files import PACKAGE
 from nanorocks_ros.settings import SimulationSettings
@@ -31,6 +32,9 @@ def test_the_command_prints_and_writes(bag, tmp_path, capsys):
     assert sorted(path.name for path in folder.iterdir()) == sorted(
         [*TABLES, 'tray_1.png', PACKAGE]
     )
+    read = nr.read(folder)
+    assert {f'{name}.csv' for name in read.tables} == set(TABLES)
+    assert read.table('energies')['species'].eq('acrylic').all()
 
 
 def test_json_is_one_object_with_errors(bag, capsys):

@@ -88,6 +88,17 @@ def test_the_page_and_the_tables_hold_the_results(measured):
     header = (folder / 'tracks.csv').read_text().splitlines()[0]
     assert 'x_px' in header
     assert ',x,' not in header
+    package = json.loads((folder / 'datapackage.json').read_text())
+    units = {
+        field['name']: field.get('unit')
+        for resource in package['resources']
+        for field in resource['schema']['fields']
+    }
+    assert units['mean_speed_px'] == units['speed_before_px'] == 'px/s'
+    assert 'mean_speed' not in units
+    rows = (folder / 'tray_1_restitutions.csv').read_text().splitlines()
+    assert any(row.startswith('1,floor,') for row in rows)
+    assert 'trays_file' in package['provenance']
 
 
 def test_a_second_run_takes_the_tracks_of_the_first_and_gives_the_same(film, measured, capsys):

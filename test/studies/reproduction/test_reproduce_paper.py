@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+import nanorocks_ros as nr
 from nanorocks_ros import __version__
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
@@ -53,6 +54,8 @@ def test_each_cycle_has_a_film_two_analyses_and_the_truth(campaign):
         assert summary['tracked']['1'] == pytest.approx([1.0, 1.0, 0.0], abs=0.1)
         assert set(summary['tracked']) <= {str(k) for k in range(1, 8)}
         assert (folder / 'film').exists()
+    read = nr.read(campaign)
+    assert set(read.speeds['tray']) <= set(range(1, 9))
     assert parts_done(campaign, PLAN) == 1.0
     assert not list(campaign.glob('.*.part'))
 
