@@ -1,4 +1,4 @@
-"""Cameras and publishers that are not as a node expects them, over real DDS.
+"""Nodes that are killed, and cameras and publishers that are not as expected, over real DDS.
 
 ``python -m pytest -q test/nodes/test_faults.py`` prints the table of docs/reference/nodes.md.
 """
@@ -16,12 +16,76 @@ pytest.importorskip('rclpy')
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import Image
+from std_msgs.msg import Float32MultiArray
 
 from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 
+SMALL = ('width_px:=240', 'height_px:=240', 'first_shake:=0.5', 'frame_rate:=10.0')
 SIZE = 240
+# Nodes compile and start on any machine.
+_PATIENCE_S = 150.0
+_QUIET_S = 3.0
+
+
+class Heard:
+    """Counts the messages of each result of tray 1."""
+
+    def __init__(self, graph, watched):
+        self._graph = graph
+        self.messages = {topic: [] for topic in watched}
+        for topic, messages in self.messages.items():
+            graph.node.create_subscription(
+                Float32MultiArray, topic.of(1), messages.append, qos_of(topic)
+            )
+
+    def drain(self):
+        """Wait until no more results come: those of a source that is gone."""
+        seen, since = -1, time.monotonic()
+        while time.monotonic() - since < _QUIET_S:
+            if seen != (seen := sum(map(len, self.messages.values()))):
+                since = time.monotonic()
+            self._graph.executor.spin_once(timeout_sec=0.05)
+
+    def after(self, action, *awaited):
+        """Do something; the time until new messages come of all topics, [s]."""
+        action()
+        start = time.monotonic()
+        for messages in self.messages.values():
+            messages.clear()
+        self._graph.until(lambda: all(self.messages[topic] for topic in awaited), _PATIENCE_S)
+        return time.monotonic() - start
+
+
+def kill(graph, process):
+    """Kill a node, and let the graph take in what it had sent."""
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 0.5
+    graph.until(lambda: time.monotonic() > end)
+
+
+def test_pipeline_and_its_camera_survive_the_loss_of_the_other(graph, fault_table):
+    heard = Heard(graph, [topics.SPEED])
+    running = {}
+
+    def start(name):
+        parameters = SMALL if name == 'simulator' else ('source:=topic',)
+        running[name] = graph.start(name, *parameters)
+
+    start('pipeline')
+    image = graph.node.resolve_topic_name(topics.RAW.name)
+    graph.until(lambda: graph.node.count_subscribers(image) == 1, _PATIENCE_S)
+    heard.after(lambda: start('simulator'), topics.SPEED)
+    for name, told in {'pipeline': 'its results', 'simulator': 'the results'}.items():
+        kill(graph, running[name])
+        heard.drain()
+        seconds = heard.after(lambda name=name: start(name), topics.SPEED)
+        other = ' of a `pipeline`' if name == 'simulator' else ''
+        fault_table(f'`{name}`{other} killed and started again', f'{told} come again', seconds)
+    for process in running.values():
+        assert graph.interrupt(process).code == 0
 
 
 def test_every_encoding_gives_the_same_tray_image_and_silence_is_told(graph, fault_table):
