@@ -1,168 +1,229 @@
-"""Real clips that nobody here made: discs found, beside trackpy, with a diameter told.
+"""Real clips that nobody here made: where they are, their licences, and how to fetch them.
 
-``python -m benchmarks.clips FOLDER`` fetches the clips into a folder, from the commit named here,
-counts the discs in each and draws those of a frame as FOLDER/NAME.png. `--mirror DIR` takes them
-from clones DIR/OWNER+NAME/repo instead of the network; `--peer PYTHON` runs trackpy beside, by an
-interpreter that has it. The clips are not part of this project.
+``python -m benchmarks.marked_clips FOLDER`` fetches them and compares tracks with marks made by
+hand. The clips are not part of this project.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
-import json
+import math
 import subprocess
-import sys
+import urllib.parse
 import urllib.request
 from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 import numpy as np
-
-from benchmarks.recognition import discs_in, read_clip, with_discs
+from scipy.io import loadmat
 
 _RAW = 'https://raw.githubusercontent.com'
-_PEER = """
-import json, sys, time
-import numpy, trackpy
-trackpy.quiet()
-frames, diameter, invert = numpy.load(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == 'dark'
-counts, seconds = [], 0.0
-trackpy.locate(frames[0], diameter, invert=invert)
-for frame in frames:
-    start = time.process_time()
-    found = trackpy.locate(frame, diameter, invert=invert)
-    seconds += time.process_time() - start
-    counts.append(int((found.mass > 0.3 * found.mass.median()).sum()))
-print(json.dumps([counts, seconds / len(frames)]))
-"""
+_MARKS = Path(__file__).parent / 'clip_marks'
+_EVERYWHERE = -math.inf, -math.inf, math.inf, math.inf
 
 
-class Clip(NamedTuple):
-    """A clip: where it is, its hash, the diameter told, and whether the beads are dark."""
+class Origin(NamedTuple):
+    """A repository on GitHub at a commit, and the licence of what is in it."""
 
     repository: str
     commit: str
-    path: str
     licence: str
+
+
+_NOTTINGHAM = Origin(
+    'MikeSmithLabTeam/particletracker', '22421de4f2bb6c5525b31bb49228b092d27a3565', 'MIT'
+)
+_LUND = Origin(
+    'mlund/particletracking', '7cc9c1ac2b4cce0d8d253f04883f6b1144593c9c', 'CC BY-SA 4.0'
+)
+_KARLSRUHE = Origin('GuenterQuast/ppBilliard', '475b671b5618c54d9275f5a8281f6a85dad82488', 'GPL 3')
+_SAINT_ETIENNE = Origin(
+    'hugolafaye/BeadTracking', 'ba014ec579ec9ce7e0af796a8b9b50987504304c', 'BSD 3-clause'
+)
+_URBANA = Origin(
+    'alexandroid000/self-assembly', '67d451296ad4a0c12feef7b2dc2673fae37119b6', 'none stated'
+)
+_BRUSSELS = Origin(
+    'LouiseMassager/DDE_project_bouncingball',
+    '0b1df771219444250d1ae11465fd81eba11dd7ef',
+    'none stated',
+)
+_ZAFIRUDDIN = Origin(
+    'arzafiruddin/BouncingBall', 'a7c94f599eef561848296a690cd3191e44d774cd', 'none stated'
+)
+
+
+class Clip(NamedTuple):
+    """A clip, what is told of it, and where marks are complete.
+
+    Parameters
+    ----------
+    origin : Origin
+    paths : tuple of str
+        A video, or images in order.
+    sha256 : str
+        Of the files, one after the other.
+    diameter : float, [px]
+        Told to both programs.
+    rate : float, [1/s]
+    shows : str
+    window : tuple of 4 floats, [px]
+        Left, top, right and bottom of the part of the frame in which all beads are marked.
+    truth : str
+        A file of marks by others, fetched like the clip.
+    """
+
+    origin: Origin
+    paths: tuple[str, ...]
     sha256: str
-    diameter: int
-    brightness: str
+    diameter: float
+    rate: float
+    shows: str
+    window: tuple[float, float, float, float] = _EVERYWHERE
+    truth: str = ''
 
 
-_TRACKER = 'MikeSmithLabTeam/particletracker', '22421de4f2bb6c5525b31bb49228b092d27a3565'
-_MIT = 'MIT-style, (c) 2021 Mike Smith and James Downs'
+class Marks(NamedTuple):
+    """Marks in a frame: number of the bead, column and row, (n, 3), [px]."""
+
+    frame: int
+    beads: np.ndarray
+
+
+_FLUME = 'Data/BaumerBimAmont20'
 CLIPS = {
     'hydrogel': Clip(
-        *_TRACKER,
-        'testdata/hydrogel.mp4',
-        _MIT,
+        _NOTTINGHAM,
+        ('testdata/hydrogel.mp4',),
         '4a0e81900ad547deeebdec189946ded28935b8c78ddce165bacece53658c446b',
         27,
-        'dark',
+        30,
+        'shaken: hydrogel spheres',
+        (495, 315, 665, 435),
     ),
     'discs': Clip(
-        *_TRACKER,
-        'testdata/discs.mp4',
-        _MIT,
+        _NOTTINGHAM,
+        ('testdata/discs.mp4',),
         '7adccedf2f12e1f0df62c59d4d75e1f1455258c0d97c220cd9aeee70bdf5abc8',
         107,
-        'bright',
+        30,
+        'sheared: clear discs of two sizes, polarised light',
+        (295, 235, 880, 662),
     ),
-    'colloids': Clip(
-        *_TRACKER,
-        'testdata/colloids.mp4',
-        _MIT,
-        '2284150cbed89858feac6c91a3e985379bc51ec3218e23e6c70aabb9bc0cb39b',
-        5,
-        'bright',
+    'shaken': Clip(
+        _LUND,
+        ('movies/N20-light.mp4',),
+        '5a41e5a15566ef6555770ead7d3be429a29fa0452e78bf82a30aa7d8834c5f7b',
+        46,
+        30,
+        'shaken: 20 discs with a post',
     ),
-    'bacteria': Clip(
-        *_TRACKER,
-        'testdata/bacteria.mp4',
-        _MIT,
-        '6c76d4cb253c1216a212827e9a6bf4957b3d219f3a8ece2c27b9beecdb7f0509',
-        9,
-        'bright',
+    'crowd': Clip(
+        _LUND,
+        ('movies/N55-light.mp4',),
+        '452497488cc335b8953087378cde3c634dabd4006c70f25ab64d0873b2e7b8bd',
+        46,
+        30,
+        'shaken: 55 discs of two colours',
+    ),
+    'colliding': Clip(
+        _KARLSRUHE,
+        ('videos/Flummies.webm',),
+        'a6087677295488266309377f01139efc3e840b7a5319e2e6d22de4d39218fbaa',
+        31,
+        30,
+        'colliding: two rubber balls, hands',
+    ),
+    'flume': Clip(
+        _SAINT_ETIENNE,
+        tuple(f'{_FLUME}/BaumerBim10MegaAmont0507Image{k}.tif' for k in range(72040, 72060)),
+        'd3a8d8a0bd0dd4c88c40517e7fc24764cbb6ba9af9cb2469225218aeeb0b1b12',
+        29,
+        130,
+        'rolling: glass beads in a stream',
+        (15, 45, 1265, 290),
+        f'{_FLUME}/Results/trackdatatruth.mat',
+    ),
+    'rolling': Clip(
+        _URBANA,
+        ('open_cv/SampleVideos/4Ball-short1.mp4',),
+        'b354ff3b013907529bdbc6983f32bdfef1ccad51b8442b332238212819a7f185',
+        31,
+        30,
+        'rolling: four balls, two of them of two colours',
     ),
     'bounce': Clip(
-        'LouiseMassager/DDE_project_bouncingball',
-        '0b1df771219444250d1ae11465fd81eba11dd7ef',
-        'tracking/videos/test.gif',
-        'none stated',
+        _BRUSSELS,
+        ('tracking/videos/test.gif',),
         '8b68d56f1159ad9a17bb95282d74c2cf158be2f124b7a75777069c9f0f4571c7',
-        13,
-        'bright',
+        12,
+        10,
+        'bouncing: a green ball, a green wall',
+    ),
+    'drop': Clip(
+        _ZAFIRUDDIN,
+        ('bounceAmeen.avi',),
+        '61121780889abf5970577cd922f40e199c947ef7201bbdc3e61d4d3d11e07893',
+        89,
+        30,
+        'bouncing: a green ball, smeared',
     ),
 }
 """Clips by name."""
 
 
-def fetch(clip, folder, mirror):
-    """Path of a clip in the folder, fetched unless it is there; its hash is checked."""
-    path = folder / Path(clip.path).name
-    if not path.is_file():
+def fetched(clip, folder, mirror=None):
+    """Files of a clip in a folder, fetched unless they are there; the hash is checked.
+
+    `mirror` has clones DIR/OWNER+NAME/repo, which are used in place of the network.
+    """
+    files = [_file(clip.origin, path, folder, mirror) for path in clip.paths]
+    digest = hashlib.sha256(b''.join(file.read_bytes() for file in files)).hexdigest()
+    if digest != clip.sha256:
+        raise SystemExit(f'clips: {clip.paths[0]}: another content than expected, {digest}')
+    return files
+
+
+def _file(origin, path, folder, mirror):
+    file = folder / Path(path).name
+    if not file.is_file():
         if mirror is None:
-            url = f'{_RAW}/{clip.repository}/{clip.commit}/{clip.path}'
+            url = f'{_RAW}/{origin.repository}/{origin.commit}/{urllib.parse.quote(path)}'
             with urllib.request.urlopen(url, timeout=60.0) as answer:
                 content = answer.read()
         else:
-            clone = mirror / clip.repository.replace('/', '+') / 'repo'
-            call = ['git', '-C', str(clone), 'show', f'{clip.commit}:{clip.path}']
+            clone = mirror / origin.repository.replace('/', '+') / 'repo'
+            call = ['git', '--git-dir', str(clone), 'show', f'{origin.commit}:{path}']
             content = subprocess.run(call, check=True, capture_output=True).stdout
-        if hashlib.sha256(content).hexdigest() != clip.sha256:
-            raise SystemExit(f'clips: {clip.path}: has another content than expected')
-        path.write_bytes(content)
-    return path
+        file.write_bytes(content)
+    return file
 
 
-def peer_counts(clip, frames, folder, peer):
-    """Features that trackpy finds in each frame, and seconds for a frame."""
-    gray = np.stack([cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) for frame in frames])
-    np.save(folder / 'frames.npy', gray)
-    diameter = clip.diameter | 1
-    call = [peer, '-c', _PEER, str(folder / 'frames.npy'), str(diameter), clip.brightness]
-    answer = subprocess.run(call, check=True, capture_output=True, text=True)
-    (folder / 'frames.npy').unlink()
-    return json.loads(answer.stdout)
+def read_frames(files):
+    """Frames of a clip, in colour."""
+    if len(files) > 1:
+        return [cv2.imread(str(file)) for file in files]
+    capture = cv2.VideoCapture(str(files[0]))
+    frames = []
+    while (read := capture.read())[0]:
+        frames.append(read[1])
+    return frames
 
 
-def report(folder, mirror, peer):
-    """Print a row for each clip."""
-    cv2.setNumThreads(1)
-    print('| clip | frames | discs | ms to learn | ms per frame | trackpy | its ms per frame |')
-    print('| --- | --- | --- | --- | --- | --- | --- |')
-    for name, clip in CLIPS.items():
-        frames = read_clip(str(fetch(clip, folder, mirror)))
-        radius = 0.5 * clip.diameter
-        chosen = list(range(0, len(frames), 6))
-        discs, learning, each = discs_in(frames, (radius / 1.2, 1.2 * radius))
-        counts = [len(rows) for rows in discs]
-        row = f'{name} | {len(frames)} | {np.median(counts):.0f} ({min(counts)} to {max(counts)})'
-        row += f' | {1e3 * learning:.0f} | {1e3 * each:.1f}'
-        if peer:
-            theirs, cost = peer_counts(clip, [frames[k] for k in chosen], folder, peer)
-            row += (
-                f' | {np.median(theirs):.0f} ({min(theirs)} to {max(theirs)}) | {1e3 * cost:.1f}'
-            )
-        print(f'| {row} |', flush=True)
-        middle = len(discs) // 2
-        image = with_discs(frames[chosen[middle]], discs[middle])
-        cv2.imwrite(str(folder / f'{name}.png'), image)
+def marks_of(name, clip, folder, mirror=None):
+    """Marks of a clip, a list of Marks in order of the frames."""
+    if clip.truth:
+        return _others_marks(_file(clip.origin, clip.truth, folder, mirror))
+    table = np.loadtxt(_MARKS / f'{name}.csv', delimiter=',', skiprows=1, ndmin=2)
+    return [Marks(int(k), table[table[:, 0] == k][:, 1:]) for k in np.unique(table[:, 0])]
 
 
-def main():
-    """Fetch, count and compare."""
-    parser = argparse.ArgumentParser(prog='python -m benchmarks.clips')
-    parser.add_argument('folder', type=Path)
-    parser.add_argument('--mirror', type=Path)
-    parser.add_argument('--peer')
-    options = parser.parse_args()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    report(options.folder, options.mirror, options.peer)
-    return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())
+def _others_marks(file):
+    """The black beads of every fifth frame, by the authors of the clip; pixels from 1 on."""
+    frames = loadmat(file)['trackData'][0]
+    marks = []
+    for k in range(0, len(frames), 5):
+        black = frames[k][frames[k][:, 2] == 0.0]
+        marks.append(Marks(k, np.column_stack([black[:, 3], black[:, :2] - 1.0]).astype(float)))
+    return marks

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 # FFmpeg would also decode text and noise, so only these formats are accepted.
-_CONTAINERS = 'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf'
+_CONTAINERS = (
+    'mov,mp4,m4a,3gp,3g2,mj2 matroska,webm avi mpegts mpeg asf mxf flv ogg nut dv ivf gif'
+)
 # Streams without a container; FFmpeg assumes 25 frames per second if it does not know the rate.
 _RAW_CODECS, _RAW_JPEGS, _YUV4MPEG = ('h264', 'hevc'), 'mjpeg', 'yuv4mpegpipe'
 FORMATS = frozenset([*_CONTAINERS.split(), *_RAW_CODECS, _RAW_JPEGS, _YUV4MPEG])
@@ -29,7 +31,7 @@ FORMATS = frozenset([*_CONTAINERS.split(), *_RAW_CODECS, _RAW_JPEGS, _YUV4MPEG])
 
 _ENDINGS = (
     'mp4 m4v mov qt 3gp 3g2 mj2 f4v mkv webm avi divx ts mts m2ts m2t mpg mpeg vob asf wmv mxf '
-    'flv ogv ogm nut dv dif ivf h264 264 avc hevc h265 265 mjpeg mjpg y4m'
+    'flv ogv ogm nut dv dif ivf gif h264 264 avc hevc h265 265 mjpeg mjpg y4m'
 )
 VIDEO_SUFFIXES = frozenset(f'.{ending}' for ending in _ENDINGS.split())
 """File extensions of videos in a folder: those of all accepted formats."""

@@ -19,9 +19,12 @@ from nanorocks_ros.experiment.film_section import FilmSection
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
 # A bead of unknown size counts as one of the flight: the constants of the stages suit it.
 _NOMINAL_DIAMETER = 2e-3
-# Largest difference of the scales along both sides, relative.
+# Largest difference of the scales along both sides, and of a corner from that of a rectangle over
+# the shorter side.
 _MAX_SKEW = 0.03
 _MM = 1e3
 _NAME = re.compile(r'[A-Za-z][\w-]{0,39}')
@@ -131,11 +134,12 @@ def _guesses(filmed: FilmedTray, largest: float) -> list[str]:
     if filmed.sides is not None and not filmed.corners_px:
         notices.append('the sides of the container are of no use without --corners')
     if filmed.height is None:
+        size = f', {_MM * largest:.3g} mm' if _is_scale_known(filmed) else ''
+        remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm and --diameter-mm'
         notices.append(
-            'the height of the container is not told; one layer of beads is assumed, '
-            f'{_MM * largest:.3g} mm; --height-mm sets it'
-            if _is_scale_known(filmed)
-            else 'the height of the container is not told; one layer of beads is assumed'
+            f'the height of the container is not told; one layer of beads is assumed{size}; in a '
+            'higher one collisions are tilted, and the restitution of the beads reads low or '
+            f'stays unknown: tell {remedy}'
         )
     if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
         notices.append(
@@ -164,11 +168,31 @@ def _region(
             f'{column} {row} to {right} {bottom} lie outside the picture of {size[0]}x{size[1]}',
             'give columns and rows in px of the film',
         )
+    _check_rectangle(corners, (low, high))
     if right - column < 16 or bottom - row < 16:
         raise ConfigurationError(
             '--corners', f'are {right - column}x{bottom - row} px apart', 'give opposite corners'
         )
     return column, row, right - column, bottom - row
+
+
+def _check_rectangle(
+    corners: tuple[tuple[float, float], ...], box: tuple[NDArray[np.float64], NDArray[np.float64]]
+) -> None:
+    """Refuse four corners of a container that is not upright and straight in the picture."""
+    if len(corners) != 4:
+        return
+    (left, top), (right, bottom) = box
+    upright = (left, top), (right, top), (right, bottom), (left, bottom)
+    off = max(min(math.dist(corner, told) for told in corners) for corner in upright)
+    if off > _MAX_SKEW * min(right - left, bottom - top):
+        raise ConfigurationError(
+            '--corners',
+            f'form no upright rectangle: one is {off:.0f} px off, so that one scale does not hold '
+            'everywhere',
+            'film straight from above, turn the camera, or calibrate it (`nanorocks calibrate`); '
+            'two opposite corners take the box around the container as it is',
+        )
 
 
 def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float, str]:

@@ -28,7 +28,7 @@ def test_a_diameter_in_pixels_is_enough():
     assert not section.container_known
     assert species.diameter * section.pixels_per_metre == pytest.approx(20.0)
     words = ' '.join(tray.notices)
-    for part in ('--diameter-mm', 'one layer'):
+    for part in ('--diameter-mm', 'one layer', 'tell --height-mm and --diameter-mm'):
         assert part in words
 
 
@@ -77,9 +77,19 @@ def test_a_diameter_in_millimetres_gives_the_scale():
         ({'corners_px': ((0.0, 0.0), (5.0, 200.0))}, 'px apart'),
         ({'corners_px': CORNERS, 'sides': (0.04, 0.06)}, 'along columns first'),
         ({'beads': ()}, 'is needed'),
+        (
+            {'corners_px': ((60.0, 20.0), (300.0, 20.0), (330.0, 220.0), (30.0, 220.0))},
+            'no upright rectangle: one is 30 px off',
+        ),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(changes, problem):
     values = {'beads': (FilmedBeads(diameter_px=20.0, count=8),), **changes}
     with pytest.raises(ConfigurationError, match=problem):
         described(FilmedTray(**values))
+
+
+def test_corners_that_are_clicked_a_little_off_are_taken():
+    corners = ((31.0, 19.0), (330.0, 21.0), (329.0, 222.0), (30.0, 220.0))
+    tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0),), corners_px=corners))
+    assert film_section(tray.text).region_px == (30, 19, 300, 203)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nanorocks_ros.stages.tracking.scene.disc_measures import (
     apart,
@@ -18,6 +17,7 @@ from nanorocks_ros.stages.tracking.scene.disc_measures import (
     ring_colours,
 )
 from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
+from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, KnownBeads
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
 from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
 from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
@@ -42,19 +42,19 @@ _INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
 _LEFT_CONTRAST = 1.5
 # A step is that of a bead above this part of the usual one: those of shadows are softer.
 _LEAST_STEP = 0.35
+# Parts of the usual step of all edges that are tried for that of beads, until discs show.
+_WEAKER = 1.0, 0.5, 0.25
 # And above so many gray levels, and times the noise.
 _LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
-# Colours and steps of alike discs: distance to a known one over the spread.
-_ALIKE, _ALIKE_MOVING = 3.0, 6.0
-_KNOWN_SHARE = 0.03
+# Distance to a known bead up to which a moving disc looks alike, in spreads.
+_ALIKE_MOVING = 6.0
 # Beads below this radius are enlarged, [px].
 _LEAST_RADIUS_PX = 4.5
 # Discs of the other brightness count when they are at least this part.
 _OTHER_SIGN_SHARE = 0.4
-_LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
+_LEAST_CONTRAST = 6.0
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
-_MOST_SAMPLES = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,8 +136,7 @@ class SceneModel:
         self._look = look
         self.colours: SceneColours = scene_colours(frames, colour).enlarged(self.scale)
         self.sees_motion = False
-        self._known: cKDTree | None = None
-        self._scales = np.ones(4)
+        self._known: KnownBeads | None = None
         chosen = np.linspace(0, len(frames) - 1, min(_LEARNING_FRAMES, len(frames)))
         self._learn([frames[round(k)] for k in chosen])
 
@@ -170,7 +169,7 @@ class SceneModel:
         )
         outlines = outlines.chosen(apart(outlines, self._look.apart))
         if self.colours.knows_background:
-            outlines = outlines.chosen(~self._left(color, outlines.discs))
+            outlines = outlines.chosen(~self._left(color, outlines))
         colours = ring_colours(color, outlines.discs, _INSIDE)
         around = ring_colours(color, outlines.discs, _OUTSIDE)
         moving = marked_shares(self.colours.moving(color), outlines.discs)
@@ -182,15 +181,24 @@ class SceneModel:
         size = color.shape[1] * self.scale, color.shape[0] * self.scale
         return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
 
-    def _left(self, color: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _left(self, color: NDArray[np.uint8], outlines: Outlines) -> NDArray[np.bool_]:
         """Discs that a bead has left: they show in the background, and less in the frame."""
-        contrasts = [
-            np.linalg.norm(
-                ring_colours(image, discs, _INSIDE) - ring_colours(image, discs, _OUTSIDE), axis=1
-            )
-            for image in (color, self.colours.background)
-        ]
-        return np.asarray(contrasts[1] > _LEFT_CONTRAST * contrasts[0] + _LEAST_COLOUR_SPREAD)
+        discs = outlines.discs
+        inside, around = (
+            [ring_colours(image, discs, parts) for image in (color, self.colours.background)]
+            for parts in (_INSIDE, _OUTSIDE)
+        )
+        now, before = (
+            np.linalg.norm(own - other, axis=1) for own, other in zip(inside, around, strict=True)
+        )
+        left = before > _LEFT_CONTRAST * now + _LEAST_CONTRAST
+        if self._known is None or not left.any():
+            return np.asarray(left)
+        # Beside a dark wall the bright floor that a bead hides stands out more than the bead.
+        radii = reduced(outlines, self.scale).discs[left, 2]
+        here, gone = (self._known.distances(colours[left], radii) for colours in inside)
+        left[left] = gone < here
+        return np.asarray(left)
 
     def alike(self, candidates: Candidates) -> NDArray[np.bool_]:
         """Which of the discs look like beads."""
@@ -198,11 +206,11 @@ class SceneModel:
         told = self._look.sign * brighter >= 0.0
         if self._known is None:
             return np.asarray(told)
-        # Not the nearest: what was taken for a bead by mistake is known, too.
-        nearest = max(1, round(_KNOWN_SHARE * self._known.n))
-        distances = self._known.query(self._features(candidates), k=[nearest])[0][:, 0]
+        radii = candidates.outlines.discs[:, 2]
+        distances = self._known.distances(candidates.colours, radii)
         rest = candidates.moving < _MOVING_SHARE
-        return np.asarray(told & (distances < np.where(rest, _ALIKE, _ALIKE_MOVING)))
+        near = distances < np.where(rest, ALIKE, _ALIKE_MOVING)
+        return np.asarray(told & self._known.have_size(radii) & near)
 
     def _outlines(
         self, color: NDArray[np.uint8], view: View, hints: NDArray[np.float64] | None = None
@@ -240,7 +248,8 @@ class SceneModel:
         moving = good & (every.moving >= _MOVING_SHARE)
         enough = max(_LEAST_MOVING, _LEAST_MOVING_SHARE * good.sum())
         self.sees_motion = bool(moving.sum() >= enough)
-        self._remember(every, moving if self.sees_motion else good)
+        known = moving if self.sees_motion else good
+        self._known = KnownBeads.of(every.colours[known], every.outlines.discs[known, 2])
 
     def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
         """The picture, for bright discs, dark ones, or both where both occur.
@@ -267,28 +276,18 @@ class SceneModel:
         voting = view.voting._replace(step=step)
         if not low > 0.0:
             voting = search_radii(view.of(frames[len(frames) // 2], self.colours), voting)
-        rows = [self._outlines(frame, view._replace(voting=voting)) for frame in frames]
-        outlines = join_outlines(rows)
-        if len(outlines.steps) == 0:
+        for part in _WEAKER:
+            # Hands, rails and skirting boards may have stronger edges than the beads.
+            step = max(part * voting.step, _LEAST_LEVELS)
+            found = view._replace(voting=voting._replace(step=step))
+            outlines = join_outlines([self._outlines(frame, found) for frame in frames])
+            if len(outlines.steps):
+                break
+        else:
             return View(moves, voting, 0.0)
         usual = float(np.quantile(outlines.steps, 0.75))
         evidence = float((outlines.support**2 * outlines.steps).sum())
         return View(moves, voting._replace(step=step * usual), evidence)
-
-    def _remember(self, candidates: Candidates, chosen: NDArray[np.bool_]) -> None:
-        """Keep what the chosen discs look like, each within the spread of all."""
-        features = self._features(candidates)[chosen]
-        if len(features) == 0:
-            return
-        spread = 1.4826 * np.median(np.abs(features - np.median(features, axis=0)), axis=0)
-        self._scales = np.maximum(spread, [_LEAST_COLOUR_SPREAD] * 3 + [_LEAST_RADIUS_SPREAD])
-        every = max(1, len(features) // _MOST_SAMPLES)
-        self._known = cKDTree(features[::every] / self._scales)
-
-    def _features(self, candidates: Candidates) -> NDArray[np.float64]:
-        """Colour and radius, over the spread of each."""
-        radii = np.log(candidates.outlines.discs[:, 2])
-        return np.asarray(np.column_stack([candidates.colours, radii]) / self._scales)
 
 
 def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneModel:

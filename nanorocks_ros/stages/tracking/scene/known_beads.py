@@ -1,0 +1,68 @@
+"""Colours and sizes of the discs that are known to be beads.
+
+Tested by ``test/stages/tracking/scene/test_known_beads.py``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+ALIKE = 3.0
+"""Distance of a disc to a known bead up to which it looks alike, in spreads of these."""
+
+# Part of the known beads that may have been taken for beads by mistake.
+_KNOWN_SHARE = 0.03
+_LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
+_MOST_SAMPLES = 400
+
+
+@dataclass(frozen=True, slots=True)
+class KnownBeads:
+    """Discs that are known to be beads.
+
+    Parameters
+    ----------
+    tree : cKDTree
+        Colours and logarithms of the radii, over the spread of each.
+    spreads : ndarray (4,)
+    sizes : tuple of 2 floats
+        The usual smallest and largest logarithm of a radius, over its spread.
+    """
+
+    tree: cKDTree
+    spreads: NDArray[np.float64]
+    sizes: tuple[float, float]
+
+    @classmethod
+    def of(cls, colours: NDArray[np.float64], radii: NDArray[np.float64]) -> KnownBeads | None:
+        """Those with these colours (n, 3) and radii (n,); None without any."""
+        if len(radii) == 0:
+            return None
+        features = np.column_stack([colours, np.log(radii)])
+        spread = 1.4826 * np.median(np.abs(features - np.median(features, axis=0)), axis=0)
+        spreads = np.maximum(spread, [_LEAST_COLOUR_SPREAD] * 3 + [_LEAST_RADIUS_SPREAD])
+        every = max(1, len(features) // _MOST_SAMPLES)
+        low, high = np.quantile(features[:, 3], [_KNOWN_SHARE, 1.0 - _KNOWN_SHARE]) / spreads[3]
+        return cls(cKDTree(features[::every] / spreads), spreads, (float(low), float(high)))
+
+    def distances(
+        self, colours: NDArray[np.float64], radii: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Distance of discs with colours (n, 3) and radii (n,) to known beads, in spreads."""
+        # Not the nearest: what was taken for a bead by mistake is known, too.
+        nearest = max(1, round(_KNOWN_SHARE * self.tree.n))
+        features = np.column_stack([colours, np.log(radii)]) / self.spreads
+        return np.asarray(self.tree.query(features, k=[nearest])[0][:, 0])
+
+    def have_size(self, radii: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether radii (n,) are those of beads: light and shadow change colours, not sizes."""
+        sizes = np.log(radii) / self.spreads[3]
+        low, high = self.sizes
+        return np.asarray((sizes > low - ALIKE) & (sizes < high + ALIKE))
