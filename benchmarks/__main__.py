@@ -32,6 +32,7 @@ ALL = (
     'recorder',
     'signals',
     'foreign_world',
+    'altered_films',
     'ranks',
     'contacts_alone',
     'own_tray',
