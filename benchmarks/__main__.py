@@ -32,6 +32,7 @@ ALL = (
     'plate_cost',
     'recorder',
     'foreign_world',
+    'altered_films',
     'ranks',
     'contacts_alone',
     'own_tray',

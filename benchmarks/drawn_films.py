@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.drawn import varied
 from benchmarks.film_measurement import FilmResult, is_flagged, measure
 from benchmarks.film_truth import FilmTruth, read_truth
-from benchmarks.filmed_cycles import DRAWN_PAIRS, folder
+from benchmarks.filmed_cycles import folder
 from benchmarks.rough_gas import SMOOTH, Roughness
 from nanorocks_ros.cli.progress import Progress
 from nanorocks_ros.experiment.trays import load_trays
@@ -36,12 +36,12 @@ from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-LOWEST_WALL = 0.8
-"""Lowest restitution of the walls that is drawn; the default prior goes further down."""
 COUNT = 'NANOROCKS_FILM_COUNT'
 """Environment variable with the number of drawn films of each tray."""
 
 _FILMS = 50
+# Restitutions of beads that are drawn; those of the walls are drawn from their prior.
+_BEADS = (0.5, 1.0)
 _SHAKE = 1.0
 _SECONDS = 26.0
 # Mean speeds after the kick, drawn with uniform logarithm, [m/s].
@@ -113,26 +113,15 @@ def draw(films: Iterable[DrawnFilm]) -> None:
         run_tasks(_draw, missing, Workers(), progress.count)
 
 
-def measured(videos: Sequence[Path], lowest_wall: float | None = None) -> list[ReadFilm]:
-    """What is measured in each film; results of an earlier run of the same code are used.
-
-    Parameters
-    ----------
-    videos : sequence of Path
-    lowest_wall : float, optional
-        Lowest wall restitution, where it is told.
-    """
-    missing = {
-        video.stem: (video, lowest_wall)
-        for video in videos
-        if not _result_file(video, lowest_wall).exists()
-    }
+def measured(videos: Sequence[Path]) -> list[ReadFilm]:
+    """What is measured in each film; results of an earlier run of the same code are used."""
+    missing = {video.stem: video for video in videos if not _result_file(video).exists()}
     with Progress('measuring in films') as progress:
         run_tasks(_measure, missing, Workers(), progress.count)
     return [
         ReadFilm(
             film=read_truth(video),
-            result=pickle.loads(_result_file(video, lowest_wall).read_bytes()),
+            result=pickle.loads(_result_file(video).read_bytes()),
         )
         for video in videos
     ]
@@ -140,9 +129,9 @@ def measured(videos: Sequence[Path], lowest_wall: float | None = None) -> list[R
 
 def _draw(film: DrawnFilm) -> None:
     """Draw the truth of a tray, and film it with a drawn camera."""
-    prior = PriorSettings(min_wall_restitution=LOWEST_WALL)
+    prior = PriorSettings()
     random = np.random.default_rng([film.number, film.tray])
-    beads = random.uniform(*DRAWN_PAIRS)
+    beads = random.uniform(*_BEADS)
     walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
     tray, values = varied(load_trays()[film.tray], walls, prior, random)
     rough = Roughness(tangential=_TANGENTIAL, friction=film.friction) if film.friction else SMOOTH
@@ -162,16 +151,14 @@ def _draw(film: DrawnFilm) -> None:
     write_drawn_film(film.stem, tray, simulation, _SECONDS, seed, moving=_MOVING)
 
 
-def _measure(video_and_wall: tuple[Path, float | None]) -> None:
-    video, lowest_wall = video_and_wall
-    path = _result_file(video, lowest_wall)
+def _measure(video: Path) -> None:
+    path = _result_file(video)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(path, pickle.dumps(measure(read_truth(video), lowest_wall)))
+    write_bytes(path, pickle.dumps(measure(read_truth(video))))
 
 
-def _result_file(video: Path, lowest_wall: float | None) -> Path:
-    told = '' if lowest_wall is None else f'_walls_{round(1e3 * lowest_wall)}'
-    return folder() / f'measured_{_code_key()}' / f'{video.stem}{told}.pickle'
+def _result_file(video: Path) -> Path:
+    return folder() / f'measured_{_code_key()}' / f'{video.stem}.pickle'
 
 
 @cache

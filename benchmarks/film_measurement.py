@@ -66,7 +66,7 @@ class FilmResult:
     flagged_speeds : float, 0 to 1
         Share of the speeds after the kick with a flag.
     counts : tuple of float
-        Of each species: beads seen over true beads, mean over frames.
+        Of each species: beads seen over those of which at least half shows, means over frames.
     radii : tuple of float
         Of each species: median of the measured radii over the mean true one.
     errors : tuple of PlaceErrors or None
@@ -100,19 +100,10 @@ def is_flagged(estimate: CorEstimate) -> bool:
     return bool(estimate.quality & ~_HARMLESS)
 
 
-def measure(film: FilmTruth, lowest_wall: float | None = None) -> FilmResult:
-    """Import a film into a temporary bag and push it through the pipeline.
-
-    Parameters
-    ----------
-    film : FilmTruth
-    lowest_wall : float, optional
-        Lowest wall restitution, where it is told.
-    """
+def measure(film: FilmTruth) -> FilmResult:
+    """Import a film into a temporary bag and push it through the pipeline."""
     cv2.setNumThreads(1)
     settings = settings_for(film)
-    if lowest_wall is not None:
-        settings = with_values(settings, {'prior.min_wall_restitution': lowest_wall}, 'benchmark')
     with tempfile.TemporaryDirectory() as scratch:
         bag = Path(scratch) / 'bag'
         try:
@@ -214,12 +205,12 @@ class _Reading:
     def _counts(self) -> tuple[float, ...]:
         if not self._tracks:
             return ()
-        true = np.bincount(self._film.species)
+        visible = self._film.visible
         seen = [
-            np.bincount(tracks.species[tracks.seen], minlength=true.size)
+            np.bincount(tracks.species[tracks.seen], minlength=visible.size)
             for tracks in self._tracks
         ]
-        return tuple((np.mean(seen, axis=0) / true).tolist())
+        return tuple((np.mean(seen, axis=0) / visible).tolist())
 
     def _radii(self, epoch_ns: int) -> tuple[float, ...]:
         """Median over beads of the measured over the true radius, by species."""

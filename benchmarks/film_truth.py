@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
 DEFAULT_SCALE = 13.5
 """Scale of films that state none, [px/mm]."""
 _PER_METRE = 1000.0
+# Frames in which it is looked which beads show, and places in a disc of radius 1, (points, 2).
+_LOOKS = 60
+_HALF = 0.5
+_GRID = np.linspace(-0.95, 0.95, 12)
+_DISC = np.array([(x, y) for x in _GRID for y in _GRID if x**2 + y**2 < 1.0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +81,31 @@ class FilmTruth:
     def magnification(self) -> NDArray[np.float64]:
         """Size of each bead in the picture over that on the floor, (frames, beads)."""
         return 1.0 / (1.0 - self.heights / self.camera_height)
+
+    @cached_property
+    def visible(self) -> NDArray[np.float64]:
+        """Beads of each species that others do not hide to more than half, mean over time."""
+        step = max(len(self.positions) // _LOOKS, 1)
+        frames = range(0, len(self.positions), step)
+        counts = [
+            np.bincount(self.species[self._shown(frame)], minlength=self.species.max() + 1)
+            for frame in frames
+        ]
+        mean: NDArray[np.float64] = np.mean(counts, axis=0)
+        return mean
+
+    def _shown(self, frame: int) -> NDArray[np.bool_]:
+        """Whether at most half of each bead is behind beads nearer to the camera, (beads,)."""
+        positions, heights = self.positions[frame], self.heights[frame]
+        points = positions[:, np.newaxis] + self.radii[:, np.newaxis, np.newaxis] * _DISC
+        hidden = np.zeros(points.shape[:2], dtype=bool)
+        pairs = cKDTree(positions).query_pairs(2.0 * self.radii.max(), output_type='ndarray')
+        for below, above in np.concatenate([pairs, pairs[:, ::-1]]).tolist():
+            if heights[above] > heights[below]:
+                apart = np.hypot(*(points[below] - positions[above]).T)
+                hidden[below] |= apart < self.radii[above]
+        shown: NDArray[np.bool_] = hidden.mean(axis=1) <= _HALF
+        return shown
 
     @cached_property
     def mean_projected_speed(self) -> NDArray[np.float64]:

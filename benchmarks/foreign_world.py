@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.drawn_films import LOWEST_WALL, DrawnFilm, ReadFilm, draw, film_count, measured
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
 from benchmarks.film_measurement import DECADES, FilmResult, is_flagged
 from benchmarks.film_truth import FilmTruth
 from nanorocks_ros.records import CorStatus, Quality
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 FOREIGN = 'NANOROCKS_FOREIGN'
 """Environment variable with the folder of films made by other code."""
 _TRAYS = (1, 3, 5, 7)
-# In this one of them most films have too few rebounds to tell the restitution of the walls.
-_FEW_REBOUNDS = 7
 _HALF_WIDTHS = 3.0
 # Factor within which stated errors count as right.
 _FACTOR = 1.5
@@ -41,9 +39,6 @@ def report() -> None:
     draw(_all_drawn())
     read = measured(films_drawn())
     print_drawn(read)
-    few_rebounds = [film.film.video for film in read if film.film.tray == _FEW_REBOUNDS]
-    print('\nThe lowest restitution of the walls told\n')
-    print_restitutions(measured(few_rebounds, LOWEST_WALL))
     foreign = films_by_other_code()
     if foreign:
         read_foreign = measured(foreign)
@@ -170,16 +165,22 @@ def _spread(values: NDArray[np.float64]) -> str:
 def print_foreign(read: list[ReadFilm]) -> None:
     """Print what is measured in each film made by other code."""
     print('\nFilms by other code\n')
+    print_heading()
+    for read_film in read:
+        print(foreign_row(read_film.film, read_film.result))
+
+
+def print_heading() -> None:
+    """Print the head of a table of `foreign_row`."""
     print(
         '| film | truth: beads, walls | cycles | beads | walls | flags | speeds | counted '
         '| radii | verdict |'
     )
     print('| --- ' * 10 + '|')
-    for read_film in read:
-        print(_foreign_row(read_film.film, read_film.result))
 
 
-def _foreign_row(film: FilmTruth, result: FilmResult) -> str:
+def foreign_row(film: FilmTruth, result: FilmResult) -> str:
+    """A row of what was measured in a film."""
     beads = f'{film.beads:g}' if math.isfinite(film.beads) else 'depends on speed'
     row = f'| {film.video.stem} | {beads}, {film.walls:g} '
     if result.refusal:

@@ -182,14 +182,14 @@ class PriorSettings:
     )
     grain_scale_error: float = setting(
         0.1,
-        'relative standard error of structure-function speeds in trays with grains, which hide '
-        'each other, cast shadows and rotate',
+        'relative standard error of speeds in trays with grains, which hide each other, cast '
+        'shadows and rotate',
         low=0.0,
         high=1.0,
     )
     grain_speed_bias: float = setting(
         0.1,
-        '`speed_bias` of structure-function speeds in trays with grains',
+        '`speed_bias` of speeds in trays with grains',
         low=0.0,
         high=0.5,
     )

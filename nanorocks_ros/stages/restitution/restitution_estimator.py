@@ -21,7 +21,6 @@ from nanorocks_ros.records import (
     Quality,
     Rebound,
     SpeedEstimate,
-    SpeedMethod,
     field_names,
 )
 from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
@@ -320,8 +319,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
             time=np.array([(sample.stamp_ns - start_ns) / NS for sample in samples]),
             speed=np.array([sample.mean_projected_speed.value for sample in samples]),
             error=np.array([sample.mean_projected_speed.error for sample in samples]),
-            of_grains=self._grains
-            and any(sample.method is SpeedMethod.STRUCTURE_FUNCTION for sample in samples),
+            of_grains=self._grains,
         )
 
     def _cycle_restitution(

@@ -69,7 +69,7 @@ class Decay:
         Since the shaking event.
     speed, error : ndarray (n,), [m/s]
     of_grains : bool
-        Whether the speeds are those of grains, by how their pictures change.
+        Whether there are grains among the beads.
     """
 
     time: NDArray[np.float64]

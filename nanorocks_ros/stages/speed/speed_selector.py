@@ -50,7 +50,7 @@ class SpeedSelector:
     @property
     def uses_contacts(self) -> bool:
         """Whether contacts and bodies found in the tracks are to be given out."""
-        return self.uses_tracks and (self._method == 'tracking' or self._tracks.reliable)
+        return self.uses_tracks and (self._method == 'tracking' or self._tracks.reliable_contacts)
 
     @property
     def uses_structure(self) -> bool:

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import Tracks
 
-# Share of the beads of each species that must be tracked, to begin and to go on.
+# Share of the beads of each species that must be tracked, to begin and to go on; and where there
+# are grains, whose tracks are cut where they jump (`jumping_tracks`).
 _ENOUGH, _STILL_ENOUGH = 0.85, 0.7
+_ENOUGH_GRAINS, _STILL_ENOUGH_GRAINS, _RELIABLE_SHARE_GRAINS = 0.7, 0.55, 0.4
 # Pictures over which the median of that share is taken; and speeds, for the share of the beads
 # that could be tracked through the window of a speed.
 _MEMORY_FRAMES = 30
@@ -46,25 +48,35 @@ class TrackReliability:
     ----------
     reliable : bool
         Whether nearly all beads of every species are being tracked.
+    reliable_contacts : bool
+        Whether contacts and bodies in these tracks can be believed, too.
     judged : bool
         Whether enough images were seen to tell.
     hopeless : bool
         Whether a species is too crowded to be tracked, so that it will never be reliable.
+    lowest_share : float
+        Share of the beads that must be tracked through the window of a speed.
     """
 
     def __init__(self, tray: Tray, *, crowded: bool) -> None:
         self._counts = np.array([species.count for species in tray.species])
         self._shares = np.empty((_MEMORY_FRAMES, self._counts.size))
         self._frames = 0
-        self._enough = False
+        self._enough, self._nearly_all = False, False
         self._tracked: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
-        self._steps: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
+        grains = any(species.properties.shape == 'grain' for species in tray.species)
+        # Grains that are shaken are confused at once; how many are seen tells it too late.
+        self._steps: deque[float] = deque(maxlen=1 if grains else _MEMORY_SPEEDS)
         # Medians of these two.
         self._usual_tracked, self._usual_step = 0.0, math.inf
         area = tray.dimensions[0] * tray.dimensions[1]
         self._neighbours = 0.5 * np.sqrt(area / self._counts)
+        self._enough_share = (
+            (_ENOUGH_GRAINS, _STILL_ENOUGH_GRAINS) if grains else (_ENOUGH, _STILL_ENOUGH)
+        )
+        self.lowest_share = _RELIABLE_SHARE_GRAINS if grains else RELIABLE_SHARE
         self.hopeless = crowded
-        self.reliable = False
+        self.reliable, self.reliable_contacts = False, False
         self.judged = crowded
 
     @property
@@ -84,8 +96,10 @@ class TrackReliability:
         if self.hopeless:
             return
         self.judged = self._frames >= _MEMORY_FRAMES
-        self._enough = share >= (_STILL_ENOUGH if self.reliable else _ENOUGH)
-        self.reliable = self.judged and self._good()
+        self._enough = share >= self._enough_share[int(self.reliable)]
+        self._nearly_all = share >= (_STILL_ENOUGH if self.reliable_contacts else _ENOUGH)
+        if self.judged:
+            self._conclude()
 
     def push_speeds(
         self, share: float, speeds: NDArray[np.float64], intervals_ns: NDArray[np.int64]
@@ -110,16 +124,21 @@ class TrackReliability:
 
     def without_colour(self) -> None:
         """Judge by an image without colour, in which nothing can be tracked."""
-        self.judged, self.reliable = True, False
+        self.judged, self.reliable, self.reliable_contacts = True, False, False
 
     def conclude(self) -> None:
         """Judge by the pictures so far, since there will be no more."""
         if not self.judged:
-            self.judged, self.reliable = True, self._good()
+            self.judged = True
+            self._conclude()
+
+    def _conclude(self) -> None:
+        self.reliable = self._enough and self._good()
+        self.reliable_contacts = self.reliable and self._nearly_all
 
     def _good(self) -> bool:
         # Where many beads are lost and found again, others are taken for them.
-        return self._enough and self._usual_tracked >= RELIABLE_SHARE and self.told_apart
+        return self._usual_tracked >= self.lowest_share and self.told_apart
 
 
 @compiled

@@ -5,6 +5,7 @@ Tested by ``test/pipeline/test_tray_measurement.py``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,15 +20,19 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
+from nanorocks_ros.stages.speed.jumping_tracks import JumpingTracks
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (
+    CUT_LOSS_BIAS,
+    LOSS_BIAS,
     NOISE_FRAMES,
-    RELIABLE_SHARE,
     mean_speeds_of_series,
 )
 from nanorocks_ros.stages.tracking.track_window import TrackWindow
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
@@ -63,9 +68,8 @@ class TrackSpeed:
 
     def __init__(self, settings: PipelineSettings, tray: Tray, *, crowded: bool) -> None:
         self._interval_ns = round(settings.speed.interval * NS)
-        self._shortest_path, self._flagged_path = _shortest_paths(
-            tray, settings.preprocess.pixels_per_metre
-        )
+        self._pixels_per_metre = settings.preprocess.pixels_per_metre
+        self._shortest_path, self._flagged_path = _shortest_paths(tray, self._pixels_per_metre)
         self._tray = tray
         self._crowded = crowded
         self.reset()
@@ -75,6 +79,7 @@ class TrackSpeed:
         del stamp_ns
         self.reliability = TrackReliability(self._tray, crowded=self._crowded)
         self._recent = TrackWindow()
+        self._jumps = JumpingTracks(self._pixels_per_metre) if self._flagged_path else None
         self._next_ns: int | None = None
         self._last_ns: int | None = None
         self._flags = Quality(0)
@@ -94,7 +99,8 @@ class TrackSpeed:
             return ()
         # The tracker knows whether tray and camera can be told apart.
         self._flags |= record.quality & Quality.STABILISATION_LOST
-        self._recent.push(record, record.stamp_ns - _LONGEST_WINDOW_NS)
+        unbroken = self._jumps.cut(record) if self._jumps else record
+        self._recent.push(unbroken, record.stamp_ns - _LONGEST_WINDOW_NS)
         self.reliability.push(record)
         if self._next_ns is not None and record.stamp_ns < self._next_ns:
             return ()
@@ -115,6 +121,16 @@ class TrackSpeed:
         if image.color is None:
             self.reliability.without_colour()
 
+    def _speeds_told_apart(
+        self, speeds: list[Measured], intervals_ns: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Speed of each species that tells how far beads move between pictures, [m/s]."""
+        if self._jumps is None:
+            return np.array([speed.value for speed in speeds])
+        # What was cut from the tracks of fast grains must not make them slow.
+        steps = [self._jumps.steps.get(kind, math.nan) for kind in range(len(speeds))]
+        return np.array(steps) * NS / float(np.median(intervals_ns))
+
     def _speeds(self, tracks: Tracks) -> tuple[SpeedEstimate, ...]:
         series = self._recent.series()
         mean, *of_species = mean_speeds_of_series(
@@ -123,6 +139,7 @@ class TrackSpeed:
             tracks.expected,
             least_distance=self._shortest_path,
             species=(None, *range(len(self._tray.species))),
+            loss_bias=CUT_LOSS_BIAS if self._jumps else LOSS_BIAS,
         )
         if mean is None or not np.isfinite(mean.mean_projected_speed):
             return ()
@@ -137,11 +154,11 @@ class TrackSpeed:
         ]
         self.reliability.push_speeds(
             min(speed.share if speed else 0.0 for speed in of_species),
-            np.array([speed.value for speed in speeds]),
+            self._speeds_told_apart(speeds, np.diff(series.stamps)),
             np.diff(series.stamps),
         )
         flags, self._flags = self._flags, Quality(0)
-        if mean.share < RELIABLE_SHARE:
+        if mean.share < self.reliability.lowest_share:
             flags |= Quality.FEW_BEADS
         path = 0.5 * mean.window * mean.mean_projected_speed
         at_rest = mean.mean_projected_speed < _REST_ERRORS * mean.mean_projected_speed_error

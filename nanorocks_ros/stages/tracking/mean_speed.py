@@ -49,9 +49,13 @@ _MIN_NOISE_RATIO = 14.0
 # ratio below which a speed is unreliable.
 _MIN_ERROR_RATIO = 8.0
 _RELIABLE_RATIO = 3.2
-# Relative error of the mean over the share of lost beads: fast beads are lost more often. At
-# 2 mm/s a quarter of the grains was lost, and the mean was 10 % too low.
-_LOSS_BIAS = 0.4
+LOSS_BIAS = 0.4
+"""Relative error of the mean over the share of lost beads: fast beads are lost more often. At
+2 mm/s a quarter of the grains was lost, and the mean was 10 % too low."""
+CUT_LOSS_BIAS = 0.2
+"""The same where tracks are cut as they jump, from drawn films of tray 7: crowded grains, which
+are lost more often, are slower."""
+
 # Smallest number of beads of a mean.
 _MIN_BEADS = 3
 # Smallest share of a species that is taken for a sample of all of it.
@@ -137,6 +141,7 @@ def mean_speeds_of_series(
     *,
     least_distance: float,
     species: Sequence[int | None],
+    loss_bias: float = LOSS_BIAS,
 ) -> list[MeanSpeed | None]:
     """Mean speeds of several species of concatenated tracks.
 
@@ -149,6 +154,8 @@ def mean_speeds_of_series(
         Number of beads in the tray.
     least_distance, species
         As in `mean_speed`.
+    loss_bias : float
+        Relative error of the mean over the share of lost beads.
     """
     return [
         _mean_speed(
@@ -157,6 +164,7 @@ def mean_speeds_of_series(
             least_distance,
             ALL_SPECIES if index is None else index,
             expected,
+            loss_bias,
         )
         for index in species
     ]
@@ -168,6 +176,7 @@ def _mean_speed(
     least_distance: float,
     species: int,
     expected: NDArray[np.int32],
+    loss_bias: float,
 ) -> MeanSpeed | None:
     minimum = MinDisplacement(
         least_distance * least_distance, _MIN_NOISE_RATIO**2, _MIN_ERROR_RATIO**2, _MIN_BEADS
@@ -188,7 +197,7 @@ def _mean_speed(
     beads = int(expected.sum() if species == ALL_SPECIES else expected[species])
     share = distances.whole_window.size / max(beads, 1)
     value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
-    error = math.hypot(error, _LOSS_BIAS * max(1.0 - share, 0.0) * value)
+    error = math.hypot(error, loss_bias * max(1.0 - share, 0.0) * value)
     return MeanSpeed(
         stamp_ns=(first + end) // 2,
         mean_projected_speed=value,

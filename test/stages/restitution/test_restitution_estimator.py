@@ -564,23 +564,22 @@ def test_a_merge_of_another_cycle_ends_no_window():
     assert final.window_end == pytest.approx(20.0, abs=0.11)
 
 
-def test_speeds_of_grains_by_their_pictures_say_less_than_speeds_by_tracks():
+@pytest.mark.parametrize('method', [SpeedMethod.STRUCTURE_FUNCTION, SpeedMethod.TRACKING])
+def test_speeds_of_grains_have_errors_of_their_own_by_either_method(method):
     tray = load_trays()[8]
     settings = SimulationSettings(tray=8, restitution=0.89, wall_restitution=0.97, seed=9)
     times = np.arange(0.5, 12.0, 0.1)
     (values,) = cooling_runs(settings, tray, times, [1]).mean_projected_speed
-    estimates = {}
-    for method in (SpeedMethod.STRUCTURE_FUNCTION, SpeedMethod.TRACKING):
-        speeds = [
-            replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
-        ]
-        stage = RestitutionEstimator(PipelineSettings(), tray)
-        *_, estimates[method] = [*all_estimates(stage, speeds), *stage.flush()]
-    grains, beads = estimates.values()
-    assert grains.status is CorStatus.FINAL
-    assert grains.restitution.lower < 0.89 < grains.restitution.upper
-    widths = [cor.restitution.upper - cor.restitution.lower for cor in (grains, beads)]
+    speeds = [
+        replace(speed(t, v), tray=8, method=method) for t, v in zip(times, values, strict=True)
+    ]
+    exact = {'prior.grain_scale_error': 0.0, 'prior.grain_speed_bias': 0.01}
+    widths = []
+    for told in ({}, exact):
+        stage = RestitutionEstimator(with_values(PipelineSettings(), told, 'test'), tray)
+        *_, grains = [*all_estimates(stage, speeds), *stage.flush()]
+        assert grains.status is CorStatus.FINAL
+        assert grains.restitution.lower < 0.89 < grains.restitution.upper
+        assert math.isfinite(grains.haff_time.value)
+        widths.append(grains.restitution.upper - grains.restitution.lower)
     assert widths[0] > 1.5 * widths[1]
-    assert math.isfinite(grains.haff_time.value)
-    assert beads.status is CorStatus.FINAL
-    assert beads.restitution.lower < 0.89 < beads.restitution.upper

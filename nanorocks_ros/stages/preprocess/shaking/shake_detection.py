@@ -32,6 +32,8 @@ from nanorocks_ros.stages.preprocess.shaking.onset_confirmation import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 _NOISE_FRAMES = 300
@@ -124,8 +126,8 @@ class MotionMeter:
         )
         if len(self._recent) >= _FEW_BEFORE:
             # In a picture with less contrast, the motion before was known less well.
-            before, unknown = (median(values) for values in zip(*self._recent, strict=True))
-            bar = self._ratio * before + max(unknown, noise)
+            motions, unknown = zip(*self._recent, strict=True)
+            bar = self._ratio * _usual(motions) + max(median(unknown), noise)
             if motion > bar:
                 frames = self._clock.confirming_frames()
                 self._candidates.add(Candidate(self._clock.previous_ns, bar, frames, gray))
@@ -143,6 +145,16 @@ class MotionMeter:
         if self._stopped_ns is None:
             self._stopped_ns = stamp_ns
         return identical or stamp_ns - self._stopped_ns < _LONGEST_STOP_NS
+
+
+def _usual(motions: Sequence[float]) -> float:
+    """The usual motion between two frames, whatever a codec does with most of them.
+
+    Frames between those that a codec takes as references hardly move, so that in H.264 three
+    frames of four are far below the mean. The largest motion may be that of a key frame.
+    """
+    without_largest = (sum(motions) - max(motions)) / (len(motions) - 1)
+    return max(median(motions), without_largest)
 
 
 def _moved(first: NDArray[np.uint8], last: NDArray[np.uint8], noise_power: float) -> bool:

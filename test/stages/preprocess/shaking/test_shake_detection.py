@@ -178,3 +178,14 @@ def test_a_shake_while_frames_are_missing_is_seen_with_the_next():
     kept = [k for k in range(60) if not 28 <= k < 35]
     grays = filmed(np.where(SECOND <= 1.0, 4.0, 100.0))
     assert onset_frames([grays[k] for k in kept], SECOND[kept]) == [kept.index(35) + 1]
+
+
+@pytest.mark.parametrize('phase', range(4))
+def test_steps_of_a_codec_are_no_shaking_though_a_key_frame_changes_them(phase):
+    # As in a film of 90 pictures a second: between P frames three B frames hardly move.
+    times = np.arange(240) / 90
+    speeds = np.tile([50.0, 36.0, 15.0, 15.0], 60)
+    key_frame = 150 + phase
+    speeds[key_frame] = 150.0
+    speeds[key_frame + 1 : key_frame + 49] = np.tile([50.0, 36.0, 32.0, 32.0], 12)
+    assert onset_frames(filmed(speeds, times, noise=0.3), times) == []

@@ -1,0 +1,202 @@
+"""Films by other code, altered as other cameras, recorders and users would: right or flagged?
+
+Each film keeps its physics and its truth; picture, codec, clock, or what the user says of it
+changes. Results stand beside those of the film as it is.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import av
+import cv2
+import numpy as np
+
+from benchmarks.film_measurement import measure
+from benchmarks.film_truth import read_truth
+from benchmarks.foreign_world import FOREIGN, films_by_other_code, foreign_row, print_heading
+from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    _Picture = NDArray[np.uint8]
+    _Change = Callable[[_Picture, int], _Picture]
+
+_FILMS = ('a1_89_99', 'p3a', 's1_turn')
+_CRF = 20
+_LOW_CRF = 32
+# Brightness over a film, over a lamp's cycle, and its exponent.
+_DIMMING, _FLICKER, _GAMMA = 0.35, 0.04, 0.6
+_FRAMES_OF_DIMMING = 1200
+_VIGNETTE = 0.35
+_NOISE = 6.0
+_TURN_DEG = 2.0
+_SMALLER = 0.7
+_WRONG_SCALE = 1.03
+_EVERY = 10
+_CLICK = 37
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alteration:
+    """What is changed in a film.
+
+    Parameters
+    ----------
+    picture : callable, optional
+        From a picture and its number to the altered picture.
+    numbers : callable, optional
+        From the number of frames to those that are written, in order.
+    keeps_times : bool
+        Whether frames keep their times where others are missing; otherwise they move together.
+    crf : int
+        Quality of H.264; more is worse.
+    size, scale : float
+        Factors of the picture's size, and of the scale that the user tells.
+    """
+
+    picture: _Change | None = None
+    numbers: Callable[[int], NDArray[np.int64]] = np.arange
+    keeps_times: bool = True
+    crf: int = _CRF
+    size: float = 1.0
+    scale: float = 1.0
+
+
+def _brightness(factor: Callable[[int], float]) -> _Change:
+    return lambda image, number: cv2.convertScaleAbs(image, alpha=factor(number))
+
+
+def _gamma(image: _Picture, _: int) -> _Picture:
+    table = 255.0 * (np.arange(256) / 255.0) ** _GAMMA
+    return cv2.LUT(image, table.round().astype(np.uint8))
+
+
+def _vignette(image: _Picture, _: int) -> _Picture:
+    height, width = image.shape[:2]
+    x, y = np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height)
+    gain = 1.0 - _VIGNETTE * 0.5 * (x**2 + y[:, np.newaxis] ** 2)
+    return (image * gain[..., np.newaxis]).round().astype(np.uint8)
+
+
+def _noise(image: _Picture, number: int) -> _Picture:
+    random = np.random.default_rng(number)
+    noisy = image + _NOISE * random.standard_normal(image.shape)
+    return noisy.round().clip(0, 255).astype(np.uint8)
+
+
+def _turned(image: _Picture, _: int) -> _Picture:
+    height, width = image.shape[:2]
+    turn = cv2.getRotationMatrix2D((0.5 * width, 0.5 * height), _TURN_DEG, 1.0)
+    return cv2.warpAffine(
+        image, turn, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+
+
+def _gray(image: _Picture, _: int) -> _Picture:
+    return cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+
+
+def _warm(image: _Picture, _: int) -> _Picture:
+    return (image * np.array([0.75, 0.95, 1.0])).round().astype(np.uint8)
+
+
+def _without(every: int) -> Callable[[int], NDArray[np.int64]]:
+    return lambda count: np.flatnonzero(np.arange(count) % every != every - 1)
+
+
+def _repeated(count: int) -> NDArray[np.int64]:
+    """Every tenth frame holds the picture before it."""
+    numbers = np.arange(count)
+    return numbers - (numbers % _EVERY == _EVERY - 1)
+
+
+ALTERATIONS: dict[str, Alteration] = {
+    'as it is, written again': Alteration(),
+    f'H.264 at crf {_LOW_CRF}': Alteration(crf=_LOW_CRF),
+    f'light falls by {_DIMMING:.0%}': Alteration(
+        picture=_brightness(lambda number: 1.0 - _DIMMING * number / _FRAMES_OF_DIMMING)
+    ),
+    f'light flickers by {_FLICKER:.0%}': Alteration(
+        picture=_brightness(lambda number: 1.0 + _FLICKER * (-1.0) ** number)
+    ),
+    'brighter midtones': Alteration(picture=_gamma),
+    'dark corners': Alteration(picture=_vignette),
+    f'noise of {_NOISE:g}': Alteration(picture=_noise),
+    'gray': Alteration(picture=_gray),
+    'warm light': Alteration(picture=_warm),
+    f'turned by {_TURN_DEG:g} degrees': Alteration(picture=_turned),
+    'mirrored': Alteration(picture=lambda image, _: np.ascontiguousarray(image[:, ::-1])),
+    f'{_SMALLER:g} times the size': Alteration(size=_SMALLER),
+    f'every {_EVERY}th frame missing': Alteration(numbers=_without(_EVERY)),
+    f'every {_EVERY}th missing, without a gap': Alteration(
+        numbers=_without(_EVERY), keeps_times=False
+    ),
+    f'every {_CLICK}th missing, without a gap': Alteration(
+        numbers=_without(_CLICK), keeps_times=False
+    ),
+    f'every {_EVERY}th repeated': Alteration(numbers=_repeated, keeps_times=False),
+    f'scale told {_WRONG_SCALE - 1:+.0%}': Alteration(scale=_WRONG_SCALE),
+    f'scale told {1 / _WRONG_SCALE - 1:+.0%}': Alteration(scale=1.0 / _WRONG_SCALE),
+}
+"""Names and changes, in the order of the table."""
+
+
+def report() -> None:
+    """Alter, measure, and print a row for each film and alteration."""
+    videos = [video for video in films_by_other_code() if video.stem in _FILMS]
+    if not videos:
+        print(f'No films by other code: set {FOREIGN} to a folder that holds some.')
+        return
+    tasks = {f'{video.stem}: {name}': (video, name) for video in videos for name in ALTERATIONS}
+    with Progress('altered films') as progress:
+        rows = run_tasks(_row, tasks, Workers(), progress.count)
+    print_heading()
+    for key in tasks:
+        print(rows[key])
+
+
+def _row(video_and_name: tuple[Path, str]) -> str:
+    video, name = video_and_name
+    film, alteration = read_truth(video), ALTERATIONS[name]
+    with tempfile.TemporaryDirectory() as folder:
+        altered = Path(folder) / f'{video.stem}.mp4'
+        _write(video, altered, alteration, round(film.frame_rate))
+        scale = film.scale * alteration.size * alteration.scale
+        result = measure(replace(film, video=altered, scale=scale))
+    return foreign_row(replace(film, video=Path(f'{video.stem}: {name}')), result)
+
+
+def _write(video: Path, path: Path, alteration: Alteration, rate: int) -> None:
+    """Write the altered film, H.264 with the stamps that its frames have."""
+    images = list(_images(video))
+    with av.open(str(path), 'w') as container:
+        options = {'crf': str(alteration.crf)}
+        stream = container.add_stream('libx264', rate=rate, options=options)
+        height, width = (round(alteration.size * side / 2) * 2 for side in images[0].shape[:2])
+        stream.width, stream.height, stream.pix_fmt = width, height, 'yuv420p'
+        for written, number in enumerate(alteration.numbers(len(images)).tolist()):
+            image = images[number]
+            if alteration.picture:
+                image = alteration.picture(image, number)
+            if alteration.size != 1.0:
+                image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format='bgr24')
+            frame.time_base = Fraction(1, rate)
+            frame.pts = number if alteration.keeps_times else written
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+
+
+def _images(video: Path) -> Iterator[_Picture]:
+    with av.open(str(video)) as container:
+        for frame in container.decode(video=0):
+            yield frame.to_ndarray(format='bgr24')
