@@ -122,21 +122,21 @@ class MotionMeter:
             for candidate in self._candidates.push(stamp_ns, motion)
             if candidate.gray is not None and _moved(candidate.gray, gray, self.noise_power)
         )
+        usual = 0.0
         if len(self._recent) >= _FEW_BEFORE:
             # In a picture with less contrast, the motion before was known less well.
-            before, unknown = (median(values) for values in zip(*self._recent, strict=True))
-            bar = self._ratio * before + max(unknown, noise)
+            usual, unknown = (median(values) for values in zip(*self._recent, strict=True))
+            bar = self._ratio * usual + max(unknown, noise)
             if motion > bar:
                 frames = self._clock.confirming_frames()
                 self._candidates.add(Candidate(self._clock.previous_ns, bar, frames, gray))
-        if not self._is_frozen(stamp_ns, motion, identical=counts[0] == gray.size):
+        if not self._is_frozen(stamp_ns, motion, usual, identical=counts[0] == gray.size):
             self._recent.append((motion, noise))
         return self._candidates.onsets(confirmed)
 
-    def _is_frozen(self, stamp_ns: int, motion: float, *, identical: bool) -> bool:
-        """Whether the picture stands still, while the beads need not."""
+    def _is_frozen(self, stamp_ns: int, motion: float, usual: float, *, identical: bool) -> bool:
+        """Whether the picture stands still, while the beads need not; `usual` is the motion."""
         full = len(self._recent) == MEMORY_FRAMES
-        usual = median(before for before, _ in self._recent) if full else 0.0
         if not full or not (identical or motion < _STOPPED * usual):
             self._stopped_ns = None
             return False
@@ -193,7 +193,9 @@ class PlateMeter:
     def __init__(self, ratio: float, least_speed: float) -> None:
         self._ratio = ratio
         self._least = least_speed
-        self._recent: deque[tuple[int, float]] = deque()
+        # Stamps of the last speeds, and those speeds that no later one reaches, which fall.
+        self._stamps: deque[int] = deque()
+        self._largest: deque[tuple[int, float]] = deque()
         self._clock = FrameClock()
         self._candidates = Candidates(_SWING_LACKING)
 
@@ -202,14 +204,19 @@ class PlateMeter:
         self._clock.push(stamp_ns)
         if not (math.isfinite(speed) and math.isfinite(error)):
             return self._candidates.onsets()
-        while self._recent and stamp_ns - self._recent[0][0] > _SWING_NS:
-            self._recent.popleft()
+        while self._stamps and stamp_ns - self._stamps[0] > _SWING_NS:
+            self._stamps.popleft()
+        while self._largest and stamp_ns - self._largest[0][0] > _SWING_NS:
+            self._largest.popleft()
         lasting = self._candidates.push(stamp_ns, speed)
-        if len(self._recent) >= _FEW_BEFORE:
-            before = max(speed for _, speed in self._recent)
+        if len(self._stamps) >= _FEW_BEFORE:
+            before = self._largest[0][1]
             bar = max(self._least, _SIGNIFICANT * error, self._ratio * before)
             if speed > bar:
                 frames = self._clock.confirming_frames()
                 self._candidates.add(Candidate(self._clock.previous_ns, bar, frames))
-        self._recent.append((stamp_ns, speed))
+        self._stamps.append(stamp_ns)
+        while self._largest and self._largest[-1][1] <= speed:
+            self._largest.pop()
+        self._largest.append((stamp_ns, speed))
         return self._candidates.onsets(tuple(candidate.before_ns for candidate in lasting))
