@@ -16,6 +16,7 @@ from benchmarks import fuzz, golden, kills, structure
 ALL = (
     'cold_start',
     'offline',
+    'offline_profile',
     'batch',
     'live',
     'live_plate',
