@@ -17,6 +17,7 @@ from benchmarks import fuzz, golden, kills, signals, structure
 ALL = (
     'cold_start',
     'offline',
+    'offline_profile',
     'batch',
     'live',
     'live_plate',

@@ -56,7 +56,8 @@ def _timed(work) -> float:
     return time.process_time() - start
 
 
-def _warm() -> None:
+def warm() -> None:
+    """Compile or load what the analysis calls, and decode on one core."""
     cv2.setNumThreads(1)
     for function in (warm_up, warm_up_speed, warm_up_clusters, warm_up_cooling):
         function()
@@ -68,7 +69,7 @@ def _peak_mb() -> float:
 
 def measure_plate(path: str) -> None:
     """Print CPU times and memory of decoding and analysing a film of the plate, as JSON."""
-    _warm()
+    warm()
     peaks: dict[int, float] = {}
 
     def note(done: int, frames: int) -> None:
@@ -94,7 +95,7 @@ def report() -> None:
 
 
 def _print_tray(path: Path) -> None:
-    _warm()
+    warm()
     filmed = film_into_bag(
         path, SimulationSettings(), duration=_SECONDS, quality=90, progress=lambda *_: None
     )
