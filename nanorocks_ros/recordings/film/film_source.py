@@ -5,6 +5,7 @@ Tested by ``test/recordings/film/test_duplicate_frames.py``.
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -160,3 +161,10 @@ class Film(Protocol):
 
     def frames(self) -> Iterator[FilmFrame]:
         """Usable frames in the order of the film."""
+
+
+def rate_remedy(path: Path) -> str:
+    """What to do with a film that tells no times, whichever command it was given to."""
+    name = shlex.quote(str(path))
+    bag = shlex.quote(str(path.with_name(f'{path.stem}_bag')))
+    return f'tell frames per second, such as 30: nanorocks import {name} --rate 30 -o {bag}'

@@ -20,6 +20,7 @@ from nanorocks_ros.recordings.film.film_source import (
     FilmFrame,
     FilmInfo,
     image_format,
+    rate_remedy,
 )
 from nanorocks_ros.recordings.film.image_file import FULL_BITS, bits_used, read_image
 from nanorocks_ros.recordings.film.natural_sort import natural_key, varying_numbers
@@ -215,7 +216,7 @@ def _times(
     raise ConfigurationError(
         str(path),
         'its images have no time stamps: neither all names nor all EXIF data contain one',
-        'pass --rate, in images per second',
+        rate_remedy(path),
     )
 
 

@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.recordings.film.film_source import rate_remedy
 from nanorocks_ros.recordings.film.pyav import pyav
 from nanorocks_ros.recordings.messages.iso8601 import parse_iso8601
 from nanorocks_ros.records import NS
@@ -152,7 +153,7 @@ def declared_rate(path: Path, container: Any, stream: Any) -> Fraction | None:
     raise ConfigurationError(
         str(path),
         'has neither time stamps nor a frame rate',
-        'pass --rate, in frames per second',
+        rate_remedy(path),
     )
 
 
