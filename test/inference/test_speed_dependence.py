@@ -23,6 +23,7 @@ from nanorocks_ros.settings import PriorSettings
 from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
 
 ENDS = np.array([0.025, 0.5, 0.975])
+NARROW = np.array([0.16, 0.5, 0.84])
 PRIOR = PriorSettings()
 NO_FLIGHTS = flight_losses(flight_table(()), Measured(0.0, 0.0))
 
@@ -52,11 +53,14 @@ def test_a_constant_restitution_does_not_depend_and_a_falling_one_does():
 
 @pytest.mark.parametrize('kind', [CycleRestitution, MeanRestitution])
 def test_the_fields_are_those_of_the_results(kind):
-    fields = speed_dependence(terms(100, 0.5), NO_FLIGHTS, PRIOR).fields(ENDS)
+    fields = speed_dependence(terms(100, 0.5), NO_FLIGHTS, PRIOR).fields(ENDS, NARROW)
     more = {'cycles': 1, 'restitution': None} if kind is MeanRestitution else {}
     result = kind(**more, **fields)
     assert result.speed_dependent
     assert 0.0 < result.wall_restitution_exponent.lower < 0.5
+    exponent = result.wall_restitution_exponent
+    narrow = result.wall_restitution_exponent_lower_68, result.wall_restitution_exponent_upper_68
+    assert exponent.lower < narrow[0] < exponent.value < narrow[1] < exponent.upper
     assert 1e-3 < result.wall_impact_speed < 1e-2
     assert np.isnan(result.restitution_exponent.value)
     assert np.isnan(result.impact_speed)
