@@ -160,8 +160,8 @@ def report() -> None:
     with Progress('altered films') as progress:
         rows = run_tasks(_row, tasks, Workers(), progress.count)
     print_heading()
-    for key in tasks:
-        print(rows[key])
+    for row in rows:
+        print(row)
 
 
 def _row(video_and_name: tuple[Path, str]) -> str:
