@@ -102,7 +102,9 @@ if [ "$(stored dependencies)" != "$wanted" ]; then
     # The lines of setuptools in the lock file, with its hashes.
     awk '/^setuptools==/ { on = 1 } on { print; if (!/\\$/) exit }' "$lock" >"$folder/setuptools.txt"
     logged 'install setuptools' pip_install --require-hashes -r "$folder/setuptools.txt"
-    logged "install $lock" pip_install --require-hashes --use-pep517 -r "$lock"
+    # The lock file names everything, so nothing is resolved: pip before 23.3 takes the newest
+    # release of `coverage[toml]`, beside the locked one of `coverage`, and stops at its hash.
+    logged "install $lock" pip_install --require-hashes --use-pep517 --no-deps -r "$lock"
     echo "$interpreter" >"$folder/interpreter"
     echo "$wanted" >"$folder/dependencies"
 fi

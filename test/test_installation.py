@@ -149,6 +149,8 @@ def test_an_environment_is_made_with_hashes_alone():
     calls = re.findall(r'pip_install (.*) -r ', script)
     assert len(calls) == 2
     assert all('--require-hashes' in call for call in calls)
+    # A release of tomorrow must not change what is installed, nor stop it.
+    assert '--no-deps' in calls[1]
     makefile = (ROOT / 'Makefile').read_text()
     assert '--generate-hashes' in makefile
 
