@@ -122,7 +122,7 @@ def _repeated(count: int) -> NDArray[np.int64]:
 ALTERATIONS: dict[str, Alteration] = {
     'as it is, written again': Alteration(),
     f'H.264 at crf {_LOW_CRF}': Alteration(crf=_LOW_CRF),
-    f'light falls by {_DIMMING:.0%}': Alteration(
+    f'light falls by {_DIMMING:.0%} in {_FRAMES_OF_DIMMING} frames': Alteration(
         picture=_brightness(lambda number: 1.0 - _DIMMING * number / _FRAMES_OF_DIMMING)
     ),
     f'light flickers by {_FLICKER:.0%}': Alteration(
@@ -130,7 +130,7 @@ ALTERATIONS: dict[str, Alteration] = {
     ),
     'brighter midtones': Alteration(picture=_gamma),
     'dark corners': Alteration(picture=_vignette),
-    f'noise of {_NOISE:g}': Alteration(picture=_noise),
+    f'noise of {_NOISE:g} gray levels': Alteration(picture=_noise),
     'gray': Alteration(picture=_gray),
     'warm light': Alteration(picture=_warm),
     f'turned by {_TURN_DEG:g} degrees': Alteration(picture=_turned),
@@ -172,7 +172,7 @@ def _row(video_and_name: tuple[Path, str]) -> str:
         _write(video, altered, alteration, round(film.frame_rate))
         scale = film.scale * alteration.size * alteration.scale
         result = measure(replace(film, video=altered, scale=scale))
-    return foreign_row(replace(film, video=Path(f'{video.stem}: {name}')), result)
+    return foreign_row(replace(film, video=Path(f'{video.stem}: {name}.mp4')), result)
 
 
 def _write(video: Path, path: Path, alteration: Alteration, rate: int) -> None:

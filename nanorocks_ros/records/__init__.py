@@ -5,6 +5,7 @@ Errors are one standard error. NaN means "not known yet", never 0.
 
 from nanorocks_ros.records.array_record import ArrayRecord as ArrayRecord
 from nanorocks_ros.records.array_record import RecordType as RecordType
+from nanorocks_ros.records.bead_tracks import BEAD_FIELDS as BEAD_FIELDS
 from nanorocks_ros.records.bead_tracks import Tracks as Tracks
 from nanorocks_ros.records.cluster_estimates import Autocorrelation as Autocorrelation
 from nanorocks_ros.records.cluster_estimates import BodyEstimate as BodyEstimate

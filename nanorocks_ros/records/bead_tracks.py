@@ -15,6 +15,19 @@ from nanorocks_ros.records.quality_flags import NOTHING_WRONG, Quality, freeze_a
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+BEAD_FIELDS = (
+    'ids',
+    'species',
+    'positions',
+    'position_errors',
+    'velocities',
+    'velocity_errors',
+    'radii',
+    'radius_errors',
+    'seen',
+)
+"""Fields of `Tracks` with an entry for each bead."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracks:

@@ -2,7 +2,7 @@
 
 A grain that others hide in part is found beside its place, or where two of them overlap, and
 found elsewhere a few pictures later; its track jumps with it. Such jumps made the mean speed of
-the grains of tray 7 up to 14 % too high in drawn films.
+the grains of tray 7 up to 16 % too high in drawn films.
 
 Tested by ``test/stages/speed/test_jumping_tracks.py``.
 """
@@ -14,26 +14,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.records import BEAD_FIELDS
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.records import Tracks
 
 # Longest step between two pictures, over the median step of the species; in an equilibrium gas
-# one bead of 10^8 moves more than 5 times as fast. And what is added for errors of places.
+# one bead of 3 x 10^7 moves more than 5 times as fast. And what is added for errors of places.
 _LONGEST_STEP, _LONGEST_ERROR_PX = 5.0, 0.5
-# Frames for which a bead may be hidden.
+# Frames from one in which a bead is seen to the next one.
 _LONGEST_GAP = 3
-_OF_BEADS = (
-    'species',
-    'positions',
-    'position_errors',
-    'velocities',
-    'velocity_errors',
-    'radii',
-    'radius_errors',
-    'seen',
-)
 
 
 class JumpingTracks:
@@ -79,8 +71,8 @@ class JumpingTracks:
         rows = seen[order]
         return replace(
             tracks,
-            ids=numbers[order],
-            **{name: getattr(tracks, name)[rows] for name in _OF_BEADS},
+            **{name: getattr(tracks, name)[rows] for name in BEAD_FIELDS}
+            | {'ids': numbers[order]},
         )
 
     def _remember(

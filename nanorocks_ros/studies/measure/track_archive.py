@@ -15,7 +15,7 @@ from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.recordings.bag.fingerprint import file_states
-from nanorocks_ros.records import Quality, Tracks
+from nanorocks_ros.records import BEAD_FIELDS, Quality, Tracks
 from nanorocks_ros.records.result_words import FlagWords
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
@@ -28,17 +28,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.settings import PipelineSettings
 
-_OF_BEADS = (
-    'ids',
-    'species',
-    'positions',
-    'position_errors',
-    'velocities',
-    'velocity_errors',
-    'radii',
-    'radius_errors',
-    'seen',
-)
 _OF_FRAMES = 'stamp_ns', 'displacement', 'quality', 'cycle'
 _KEY = 'made_by'
 
@@ -81,7 +70,7 @@ def save_tracks(path: Path, tracked: TrackedBag, key: str) -> None:
         for name in _OF_FRAMES:
             column = [np.asarray(getattr(record, name)) for record in records]
             arrays[f'{prefix}{name}'] = np.array(column)
-        for name in _OF_BEADS:
+        for name in BEAD_FIELDS:
             arrays[f'{prefix}{name}'] = np.concatenate(
                 [getattr(record, name) for record in records]
             )
@@ -133,7 +122,7 @@ def _tracks(arrays: dict[str, NDArray[Any]], number: int, counts: list[int]) -> 
     prefix = f'tray_{number}.'
     ends = np.cumsum(arrays[f'{prefix}counts'])
     expected = np.array(counts, dtype=np.int32)
-    pieces = {name: np.split(arrays[f'{prefix}{name}'], ends[:-1]) for name in _OF_BEADS}
+    pieces = {name: np.split(arrays[f'{prefix}{name}'], ends[:-1]) for name in BEAD_FIELDS}
     frames = {name: arrays[f'{prefix}{name}'] for name in _OF_FRAMES}
     return [
         Tracks(
