@@ -43,7 +43,9 @@ class TrackSeries(NamedTuple):
     seen : ndarray of bool, (n,)
     positions : ndarray (n, 2), [m]
         In the camera frame: the tray may swing under the beads.
-    errors : ndarray (n,), [m]
+    errors, radii : ndarray (n,), [m]
+    displacements : ndarray (m, 2), [m]
+        Of the tray in each frame.
     """
 
     stamps: NDArray[np.int64]
@@ -53,6 +55,8 @@ class TrackSeries(NamedTuple):
     seen: NDArray[np.bool_]
     positions: NDArray[np.float64]
     errors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    displacements: NDArray[np.float64]
 
 
 class MinDisplacement(NamedTuple):
@@ -77,20 +81,23 @@ class MinDisplacement(NamedTuple):
 def join_tracks(tracks: Sequence[Tracks]) -> TrackSeries:
     """Concatenate records, at least one."""
     counts = [record.ids.size for record in tracks]
-    displacements = np.repeat(np.array([record.displacement for record in tracks]), counts, axis=0)
+    displacements = np.array([record.displacement for record in tracks])
+    moved = np.repeat(displacements, counts, axis=0)
     return TrackSeries(
         stamps=np.array([record.stamp_ns for record in tracks], dtype=np.int64),
         first=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]),
         ids=np.concatenate([record.ids for record in tracks]),
         species=np.concatenate([record.species for record in tracks]),
         seen=np.concatenate([record.seen for record in tracks]),
-        positions=np.concatenate([record.positions for record in tracks]) + displacements,
+        positions=np.concatenate([record.positions for record in tracks]) + moved,
         errors=np.concatenate([record.position_errors for record in tracks]),
+        radii=np.concatenate([record.radii for record in tracks]),
+        displacements=displacements,
     )
 
 
 @compiled
-def _usable_beads(series: TrackSeries, frame: int, species: int) -> NDArray[np.int64]:
+def usable_beads(series: TrackSeries, frame: int, species: int) -> NDArray[np.int64]:
     """Rows of the visible beads of a frame with small position errors."""
     first, last = series.first[frame], series.first[frame + 1]
     rows = np.empty(last - first, dtype=np.int64)
@@ -148,9 +155,9 @@ def position_noise(series: TrackSeries, species: int) -> float:
     squares = np.empty(2 * series.ids.size)
     rows = np.empty((3, series.ids.size), dtype=np.int64)
     n = 0
-    first, second = _usable_beads(series, 0, species), _usable_beads(series, 1, species)
+    first, second = usable_beads(series, 0, species), usable_beads(series, 1, species)
     for frame in range(series.stamps.size - 2):
-        third = _usable_beads(series, frame + 2, species)
+        third = usable_beads(series, frame + 2, species)
         before = series.stamps[frame + 1] - series.stamps[frame]
         after = series.stamps[frame + 2] - series.stamps[frame + 1]
         if abs(before - after) <= _MAX_INTERVAL_DIFFERENCE * before:
@@ -212,9 +219,9 @@ def displacements_between(
     position_variance : float, [m^2]
         Median of the whole variance of a coordinate.
     """
-    later = _usable_beads(series, frames[0], species)
-    middle = _usable_beads(series, frames[1], species)
-    earlier = _usable_beads(series, frames[2], species)
+    later = usable_beads(series, frames[0], species)
+    middle = usable_beads(series, frames[1], species)
+    earlier = usable_beads(series, frames[2], species)
     rows = np.empty((3, min(later.size, middle.size, earlier.size)), dtype=np.int64)
     n = _common_beads(series.ids, later, middle, earlier, rows)
     distances, variances = np.empty((3, n)), np.empty(n)
@@ -264,16 +271,16 @@ def pair_displacements(
     Returns
     -------
     distances : ndarray (n,), [m]
-    species : ndarray of int64, (n,)
+    rows : ndarray of int64, (2, n)
+        Of these beads in the later and in the earlier frame.
     """
-    first, second = _usable_beads(series, later, species), _usable_beads(series, earlier, species)
+    first, second = usable_beads(series, later, species), usable_beads(series, earlier, species)
     rows = np.empty((3, min(first.size, second.size)), dtype=np.int64)
     n = _common_beads(series.ids, first, second, second, rows)
-    distances, kinds = np.empty(n), np.empty(n, dtype=np.int64)
+    distances = np.empty(n)
     for k in range(n):
         distances[k] = _distance(series, rows[0, k], rows[1, k])
-        kinds[k] = series.species[rows[0, k]]
-    return distances, kinds
+    return distances, rows[:2, :n]
 
 
 @compiled

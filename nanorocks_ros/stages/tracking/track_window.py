@@ -30,6 +30,7 @@ class TrackWindow:
     def __init__(self) -> None:
         self._stamps: deque[int] = deque()
         self._counts: deque[int] = deque()
+        self._displacements: deque[NDArray[np.float64]] = deque()
         self._end = 0
         # The fields of a `TrackSeries` that have an entry for each bead.
         self._columns: list[NDArray[Any]] = []
@@ -46,6 +47,7 @@ class TrackWindow:
         """Remove all frames."""
         self._stamps.clear()
         self._counts.clear()
+        self._displacements.clear()
         self._end = 0
 
     def push(self, tracks: Tracks, since_ns: int) -> None:
@@ -56,10 +58,12 @@ class TrackWindow:
             tracks.seen,
             tracks.positions + tracks.displacement,
             tracks.position_errors,
+            tracks.radii,
         ]
         while self._stamps and self._stamps[0] < since_ns:
             self._stamps.popleft()
             self._counts.popleft()
+            self._displacements.popleft()
         self._grow(new)
         last = self._end + tracks.ids.size
         for column, values in zip(self._columns, new, strict=True):
@@ -67,6 +71,7 @@ class TrackWindow:
         self._end = last
         self._stamps.append(tracks.stamp_ns)
         self._counts.append(tracks.ids.size)
+        self._displacements.append(tracks.displacement)
 
     def _grow(self, new: list[NDArray[Any]]) -> None:
         kept, needed = sum(self._counts), len(new[0])
@@ -88,4 +93,6 @@ class TrackWindow:
         rows = slice(self._end - int(counts.sum()), self._end)
         stamps = np.array(self._stamps, dtype=np.int64)[first:]
         ends = np.concatenate([[0], np.cumsum(counts)])
-        return TrackSeries._make((stamps, ends, *(values[rows] for values in self._columns)))
+        displacements = np.array(self._displacements)[first:]
+        columns = (values[rows] for values in self._columns)
+        return TrackSeries._make((stamps, ends, *columns, displacements))

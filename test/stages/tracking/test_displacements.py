@@ -87,10 +87,12 @@ def test_pair_displacements_are_of_the_beads_visible_in_both_frames(species):
         tracks = [_frame(rng, number) for number in range(3)]
         earlier, later = (_usable(tracks[k], species) for k in (0, 2))
         common = sorted(earlier.keys() & later.keys())
-        distances, kinds = pair_displacements(join_tracks(tracks), 2, 0, species)
+        series = join_tracks(tracks)
+        distances, rows = pair_displacements(series, 2, 0, species)
         paths = [np.linalg.norm(later[bead][0] - earlier[bead][0]) for bead in common]
         assert distances == pytest.approx(paths)
-        assert kinds.tolist() == [bead % 2 for bead in common]
+        assert series.ids[rows].tolist() == [common, common]
+        assert np.all((rows >= series.first[[[2], [0]]]) & (rows < series.first[[[3], [1]]]))
 
 
 def test_the_noise_is_unknown_without_three_frames_at_equal_intervals():
