@@ -3,7 +3,8 @@
 Drawn films (`drawn_films`): the pipeline is told the tray's nominal values, the scale and where
 the floor is. Films by other code are read from the folder ``NANOROCKS_FOREIGN``, by default
 ``../shared/data/foreign``: videos with their truth in ``.npz`` files. ``NANOROCKS_FILM_COUNT`` is
-the number of films a tray, 50 by default.
+the number of films a tray, 50 by default; ``NANOROCKS_DRAWN_FILMS`` names films by tray and number
+instead: ``3_12,5_0``.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 FOREIGN = 'NANOROCKS_FOREIGN'
 """Environment variable with the folder of films made by other code."""
+DRAWN = 'NANOROCKS_DRAWN_FILMS'
+"""Environment variable with trays and numbers of the drawn films."""
 _TRAYS = (1, 3, 5, 7)
 _HALF_WIDTHS = 3.0
 # Factor within which stated errors count as right.
@@ -61,6 +64,9 @@ def films_by_other_code() -> list[Path]:
 
 
 def _all_drawn() -> list[DrawnFilm]:
+    named = [name.split('_') for name in os.environ.get(DRAWN, '').split(',') if name]
+    if named:
+        return [DrawnFilm(tray=int(tray), number=int(number)) for tray, number in named]
     return [
         DrawnFilm(tray=tray, number=number) for number in range(film_count()) for tray in _TRAYS
     ]
@@ -203,13 +209,16 @@ def foreign_row(film: FilmTruth, result: FilmResult) -> str:
 def print_errors(read: list[ReadFilm]) -> None:
     """Print stated errors of places and radii over the true ones, film by film."""
     print('\nErrors of places and radii, by species\n')
-    print('| film | px/mm | true error [px] | between frames | stated / true | radii |')
-    print('| --- ' * 6 + '|')
+    print(
+        '| film | px/mm | common shift [px] | true error about it | between frames '
+        '| stated / true | radii |'
+    )
+    print('| --- ' * 7 + '|')
     for read_film in read:
         errors = [error for error in read_film.result.errors if error]
         columns = [
             [f'{getattr(error, name):.2f}' for error in errors]
-            for name in ('true', 'white', 'place_ratio', 'radius_ratio')
+            for name in ('shift', 'true', 'white', 'place_ratio', 'radius_ratio')
         ]
         cells = ' | '.join(', '.join(column) for column in columns)
         print(f'| {read_film.film.video.stem} | {read_film.film.scale / 1000.0:.1f} | {cells} |')

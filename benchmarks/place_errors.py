@@ -35,13 +35,17 @@ class PlaceErrors:
 
     Parameters
     ----------
+    shift : float, [px]
+        Length of the median error of all beads of the species, beside those of the others: what
+        light and shade displace alike. It changes neither speeds nor distances within a species.
     true, white : float, [px]
-        True error of a coordinate, from the median of absolute values; and the part of it that
-        differs between frames.
+        True error of a coordinate about that shift, from the median of absolute values; and the
+        part of it that differs between frames.
     place_ratio, radius_ratio : float
         Median of the stated errors over the true one.
     """
 
+    shift: float
     true: float
     white: float
     place_ratio: float
@@ -128,13 +132,15 @@ def _remove_common(pairs: NDArray[np.float64]) -> None:
 def _errors_of(pairs: NDArray[np.float64], scale: float) -> PlaceErrors:
     order = np.lexsort((pairs[:, 0], pairs[:, 1]))
     pairs = pairs[order]
-    errors = scale * pairs[:, 4:6]
+    shift = np.median(scale * pairs[:, 4:6], axis=0)
+    errors = scale * pairs[:, 4:6] - shift
     same = (pairs[2:, 1] == pairs[:-2, 1]) & (pairs[2:, 0] - pairs[:-2, 0] == 2)
     second = (errors[2:] - 2.0 * errors[1:-1] + errors[:-2])[same]
     true = _DEVIATION * float(np.median(np.abs(errors)))
     last = np.append(pairs[1:, 1] != pairs[:-1, 1], True)
     of_radii = _DEVIATION * float(np.median(np.abs(pairs[last, 8])))
     return PlaceErrors(
+        shift=float(np.hypot(*shift)),
         true=true,
         white=_DEVIATION * float(np.median(np.abs(second))) / float(np.sqrt(6.0)),
         place_ratio=scale * float(np.median(pairs[:, 6])) / true,

@@ -47,7 +47,8 @@ class Tracks:
     positions : ndarray (n, 2), [m]
         Of the centres, from the corner of the floor where it is now; along columns and rows.
     position_errors : ndarray (n,), [m]
-        Standard error of a coordinate.
+        Standard error of a coordinate about a shift that all beads of a species have in common,
+        from the direction of the light: it changes neither speeds nor distances within a species.
     velocities : ndarray (n, 2), [m/s]
         Past the camera, not the swinging tray, at the instant of the picture; NaN when unknown.
     velocity_errors : ndarray (n,), [m/s]
