@@ -34,7 +34,11 @@ COLUMNS = (
     Column(name='species', kind='string', doc='material of the bead'),
     Column(name='x', unit='m', doc='of the centre, along columns from the corner of the floor'),
     Column(name='y', unit='m', doc='along rows'),
-    Column(name='position_error', unit='m', doc='one standard error of each'),
+    Column(
+        name='position_error',
+        unit='m',
+        doc='one standard error of each, about a shift that all beads of a species share',
+    ),
     Column(name='vx', unit='m/s', doc='past the camera, along columns'),
     Column(name='vy', unit='m/s', doc='along rows'),
     Column(name='velocity_error', unit='m/s', doc='one standard error of each'),
