@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 
 # Covered share of a bead above which it is not found (`tracking.min_visible_fraction`).
 _HIDDEN = 0.7
-# Radius of the surroundings of a bead, in radii: half as many, or a third more, changed mean
-# speeds by less than 1 %.
+# Radius of the surroundings of a bead, in radii; 2 or 4 changed mean speeds by less than 1 %.
 _SURROUNDINGS = 3.0
 # Largest chance to lie below, and to be placed badly, where a bead would be hidden.
 _MAX_BELOW, _MAX_SPOILT = 0.5, 0.8
