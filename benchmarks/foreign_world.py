@@ -82,6 +82,13 @@ def print_drawn(read: list[ReadFilm]) -> None:
     print('| --- ' * (4 + len(DECADES) - 1) + '|')
     for tray, films in _by_tray(read).items():
         print(_speed_row(tray, [read_film.result for read_film in films]))
+    print('\nDrawn films: measured over true speeds, film by film\n')
+    print(f'| film | {groups} | speeds flagged |')
+    print('| --- ' * (2 + len(DECADES) - 1) + '|')
+    for read_film in read:
+        ratios = ' | '.join(f'{ratio:.3f}' for ratio in read_film.result.speed_ratios)
+        name = read_film.film.video.stem
+        print(f'| {name} | {ratios} | {read_film.result.flagged_speeds:.2f} |')
 
 
 def print_restitutions(read: list[ReadFilm]) -> None:
