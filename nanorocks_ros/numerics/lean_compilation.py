@@ -48,8 +48,8 @@ class _Library(codegen.JITCodeLibrary):
 
         Loops over variables that still lie in memory are not vectorised by the second step alone.
         """
-        super()._optimize_functions(self._final_module)
-        super()._optimize_final_module()
+        super()._optimize_functions(self._final_module)  # type: ignore[no-untyped-call]
+        super()._optimize_final_module()  # type: ignore[no-untyped-call]
 
 
 class _CalledLibrary(_Library):
