@@ -23,6 +23,8 @@ from nanorocks_ros.numerics.compile_lock import compile_once
 
 # Imports at the left margin; those for the type checker alone are indented and not compiled.
 _IMPORT = re.compile(rb'^(?:from|import) ([\w.]+)', re.MULTILINE)
+# How functions are compiled; imported by a function, and not where numba compiles in its own way.
+_COMPILER = 'nanorocks_ros.numerics.lean_compilation'
 _DAY_S = 86_400.0
 # Folders of code that was not used for so long are removed, [s].
 _UNUSED_S = 30.0 * _DAY_S
@@ -73,10 +75,10 @@ def share(dispatcher: Any, module: str) -> None:
 
 @cache
 def code_key(module: str) -> str:
-    """A short hash of a module and of all modules of its package that it imports."""
+    """A short hash of a module, of all of its package that it imports, and of the compiler."""
     package = module.partition('.')[0]
     texts: dict[str, bytes] = {}
-    pending = [module]
+    pending = [module, _COMPILER]
     while pending:
         name = pending.pop()
         path = getattr(sys.modules.get(name), '__file__', None)

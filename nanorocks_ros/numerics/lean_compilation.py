@@ -43,6 +43,14 @@ class _Library(codegen.JITCodeLibrary):
     def _optimize_functions(self, ll_module: Any) -> None:
         """Leave that to the optimisation of the complete code."""
 
+    def _optimize_final_module(self) -> None:
+        """Optimise each function by itself, once, and then the complete code.
+
+        Loops over variables that still lie in memory are not vectorised by the second step alone.
+        """
+        super()._optimize_functions(self._final_module)  # type: ignore[no-untyped-call]
+        super()._optimize_final_module()  # type: ignore[no-untyped-call]
+
 
 class _CalledLibrary(_Library):
     """Intermediate code of a function that compiled functions call, and of those it calls."""

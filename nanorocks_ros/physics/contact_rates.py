@@ -235,11 +235,13 @@ def _pair_crowding(
 ) -> NDArray[np.float64]:
     """Relative increase of contacts of two beads to first order in the density, (n, n)."""
     points = _spread(5)
-    directions, third = _sphere(points), _ball(points[:, [3, 4, 2]])
+    # Rows of coordinates: numpy multiplies whole rows, but takes each point by itself.
+    directions = np.ascontiguousarray(_sphere(points).T)
+    third = np.ascontiguousarray(_ball(points[:, [3, 4, 2]]).T)
     crowding = np.array(overlaps)
     for a, b in np.ndindex(touch.shape):
         apart = touch[a, b] * directions
-        weight = _shared(room[a], room[b], apart).prod(axis=1).mean()
+        weight = _product(_shared(_column(room[a]), _column(room[b]), apart)).mean()
         for c in range(beads.counts.size):
             others = beads.counts[c] - (a == c) - (b == c)
             if others <= 0.0:
@@ -249,6 +251,15 @@ def _pair_crowding(
             kept = volume / (weight * room[c].prod())
             crowding[a, b] += others * (overlaps[a, c] + overlaps[b, c] - kept)
     return crowding
+
+
+def _column(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return values[:, np.newaxis]
+
+
+def _product(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product of three rows, place by place."""
+    return np.asarray(rows[0] * rows[1] * rows[2])
 
 
 def _kept_off(
@@ -263,18 +274,19 @@ def _kept_off(
     ----------
     rooms : ndarray (3, 3), [m]
         Of the bead, its partner and the third.
-    apart, third : ndarray (n, 3), [m], [1]
+    apart, third : ndarray (3, n), [m], [1]
         Position of the partner relative to the bead, and of the third in units of the contact
         distance.
     reach : tuple of 2 floats, [m]
         Contact distances of the third with the bead and with its partner.
     """
     offset = reach[0] * third
-    half = 0.5 * rooms
+    half = 0.5 * rooms[..., np.newaxis]
     low = np.maximum(np.maximum(-half[0], -half[1] - apart), -half[2] - offset)
     high = np.minimum(np.minimum(half[0], half[1] - apart), half[2] - offset)
-    places = np.clip(high - low, 0.0, None).prod(axis=1)
-    shared = ((offset - apart) ** 2).sum(axis=1) < reach[1] ** 2
+    places = _product(np.clip(high - low, 0.0, None))
+    squares = (offset - apart) ** 2
+    shared = squares[0] + squares[1] + squares[2] < reach[1] ** 2
     return _volume(reach[0]) * float((places * (1.0 - 0.5 * shared)).mean())
 
 

@@ -5,6 +5,7 @@ That the results are those of numba's own compilation is tested by all tests of 
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numba
@@ -45,6 +46,23 @@ def sorted_copies(count):
     keys = np.arange(count)[::-1] // 2
     order = np.argsort(keys, kind='mergesort')
     return order, keys[order], np.median(keys.astype(np.float64))
+
+
+@lean
+def write_shares(color, floor, others, shares):
+    """A loop over the pixels of a picture, with limits and a choice, but without branches."""
+    pixels, empty = color.reshape(-1), floor.reshape(-1)
+    flat, out = others.reshape(-1), shares.reshape(-1)
+    three, one = np.uint64(3), np.uint64(1)
+    least, lowest, most = np.float32(30.0), np.float32(0.0), np.float32(255.0)
+    for pixel in range(out.size):
+        k = np.uint64(pixel)
+        level = np.float32(pixels[three * k]) + np.float32(pixels[three * k + one])
+        light = np.float32(empty[three * k]) + np.float32(empty[three * k + one])
+        share = np.float32(200.0) * level / max(light, least)
+        value = np.uint8(min(max(share, lowest), most))
+        other = flat[k]
+        out[k] = value if light > least else other
 
 
 @lean
@@ -99,3 +117,12 @@ def test_a_function_compiled_by_numba_calls_one_of_this_package():
     assert doubled(3) == 6
     with pytest.raises(ValueError, match='negative'):
         doubled(-3)
+
+
+def test_loops_are_vectorised():
+    gray = np.arange(100, dtype=np.uint8).reshape(10, 10)
+    color, shares = np.repeat(gray[:, :, np.newaxis], 3, axis=2), np.empty_like(gray)
+    write_shares(color, color, gray, shares)
+    assert shares.ravel().tolist() == [*range(16), *[200] * 84]
+    (code,) = write_shares.inspect_llvm().values()
+    assert re.search(r'fdiv <\d+ x float>', code)

@@ -64,13 +64,16 @@ class RoughTables:
     ----------
     friction : float
         Of floor, lid and side walls.
-    mean, slopes
-        As of `DecayTables`, with one more nuisance, the friction of the beads.
+    mean
+        As of `DecayTables`.
+    bead_slope : ndarray (n_c * n_w, n_x)
+        Change of ln f for one standard deviation of one more nuisance, the friction of the beads.
+        Those of the others are those of smooth beads, and kept once.
     """
 
     friction: float
     mean: NDArray[np.float64]
-    slopes: NDArray[np.float64]
+    bead_slope: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -257,7 +260,8 @@ def decay_likelihood(
     rough = []
     below = sum(rubbing.friction < highest_friction for rubbing in tables.rough)
     for rubbing in tables.rough[: below + 1] if highest_friction > 0.0 else ():
-        own = replace(tables, mean=rubbing.mean, slopes=rubbing.slopes)
+        slopes = np.concatenate((tables.slopes, rubbing.bead_slope[:, np.newaxis]), axis=1)
+        own = replace(tables, mean=rubbing.mean, slopes=slopes)
         # The misfit with friction acts as an error of the scale, as that without.
         scale = math.hypot(unknowns.scale, library.friction_misfit * rubbing.friction)
         likelihood = _scaled(own, data, cells, unknowns._replace(scale=scale), all_places)

@@ -63,14 +63,13 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
         share = spread / UNITS[number]
         slopes.append(0.5 * (high - low) * share)
         shifts += (0.5 * (high + low) - mean) * share**2
-    smooth_slopes = np.stack(slopes, axis=1)
     corners, shares = _corners(library, beads, walls)
     return DecayTables(
         decays=library,
         restitution=restitution,
         wall_restitution=wall,
         mean=_smooth(mean + shifts),
-        slopes=_smooth(smooth_slopes),
+        slopes=_smooth(np.stack(slopes, axis=1)),
         corners=corners,
         shares=shares,
         start=(math.log(settings.initial_speed), settings.initial_speed_spread),
@@ -80,7 +79,7 @@ def tables_of(library: DecayLibrary, tray: Tray, settings: PriorSettings) -> Dec
                 (beads, walls),
                 friction,
                 settings.bead_friction_spread,
-                (shifts, smooth_slopes),
+                shifts,
             )
             for friction in (FRICTIONS if library.rough else ())
         ),
@@ -92,14 +91,13 @@ def _rough_tables(
     restitutions: tuple[NDArray[np.float64], NDArray[np.float64]],
     friction: float,
     spread: float,
-    smooth: tuple[NDArray[np.float64], NDArray[np.float64]],
+    shifts: NDArray[np.float64],
 ) -> RoughTables:
     """Decays with a friction of walls and beads, and their change with that of beads alone.
 
-    `smooth` is what the nuisances do to smooth beads: the change of the mean, and the slopes.
+    `shifts` is by how much the nuisances change the mean of smooth beads.
     """
     beads, walls = restitutions
-    shifts, smooth_slopes = smooth
 
     def log_speed(beads_over_walls: float) -> NDArray[np.float64]:
         point = np.zeros((beads.size, len(FRICTION)))
@@ -110,7 +108,7 @@ def _rough_tables(
     return RoughTables(
         friction=friction,
         mean=_smooth(log_speed(0.0) + shifts),
-        slopes=_smooth(np.concatenate((smooth_slopes, change[:, np.newaxis]), axis=1)),
+        bead_slope=_smooth(change),
     )
 
 

@@ -93,16 +93,24 @@ def _add_disc(discs: Discs, k: int, own: NDArray[np.float64]) -> None:
 @compiled
 def _overlapping(discs: Discs, species: int, share: float) -> int:
     """Discs seen that are nearer to another one than this share of the sum of their radii."""
-    count = discs.ids.size
+    own = np.empty(discs.ids.size, dtype=np.int64)
+    count = 0
+    for k in range(discs.ids.size):
+        if _counts(discs, k, species):
+            own[count] = k
+            count += 1
     overlaps = np.zeros(count, dtype=np.bool_)
-    for k in range(count):
-        for j in range(k):
+    for m in range(count):
+        k = own[m]
+        for n in range(m):
+            j = own[n]
+            limit = share * (discs.radii[k] + discs.radii[j])
+            # Most discs are too far apart along one axis alone.
             x = discs.positions[k, 0] - discs.positions[j, 0]
-            y = discs.positions[k, 1] - discs.positions[j, 1]
-            if not _length(x, y) < share * (discs.radii[k] + discs.radii[j]):
-                continue
-            if _counts(discs, k, species) and _counts(discs, j, species):
-                overlaps[k] = overlaps[j] = True
+            if abs(x) < limit:
+                y = discs.positions[k, 1] - discs.positions[j, 1]
+                if _length(x, y) < limit:
+                    overlaps[m] = overlaps[n] = True
     return int(overlaps.sum())
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.stages.tracking.detection.pixel_classes import RED
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ _DARKEST, _BRIGHTEST = 40, 250
 _MIN_CONTRAST = 30.0
 # Smallest number of pixels from which a line is estimated.
 _MIN_PIXELS = 50.0
+_RED_CHANNEL = 2
 
 
 class FloorCoverage:
@@ -55,7 +56,7 @@ class FloorCoverage:
     """
 
     def __init__(self, kind: int, color: tuple[float, float, float]) -> None:
-        self._bright, self._dark = (2, 0) if kind == RED else (0, 2)
+        self._bright, self._dark = (_RED_CHANNEL, 0) if kind == RED else (0, _RED_CHANNEL)
         self._kind = kind
         slope = 0.5 * (color[self._dark] + color[1]) / max(color[self._bright], 1.0)
         self._slope = min(slope, 1.0)
@@ -101,9 +102,7 @@ class FloorCoverage:
         """
         if self._map.shape != darkness.shape:
             self._map = np.empty(darkness.shape, dtype=np.uint8)
-        write_coverage(
-            color, background, darkness, self._bright, self._dark, self._slope, self._map
-        )
+        write_coverage(color, background, darkness, self._bright, self._slope, self._map)
         return self._map
 
 
@@ -144,29 +143,42 @@ def write_coverage(
     background: NDArray[np.uint8],
     darkness: NDArray[np.uint8],
     bright: int,
-    dark: int,
     shade: float,
     coverage: NDArray[np.uint8],
 ) -> None:
-    """Write the coverage of the floor, see `FloorCoverage.map`."""
+    """Write the coverage of the floor, see `FloorCoverage.map`; `bright` is a channel, 0 or 2."""
     pixels, empty = color.reshape(-1), background.reshape(-1)
     dark_map, result = darkness.reshape(-1), coverage.reshape(-1)
-    three, green = np.uint64(3), np.uint64(1)
-    bright_channel, dark_channel = np.uint64(bright), np.uint64(dark)
     slope = np.float32(shade)
-    half, span = np.float32(0.5), np.float32(FULL_COVERAGE - NO_COVERAGE)
-    lowest, highest = np.float32(0.0), np.float32(255.0)
-    top, min_contrast = np.float32(FULL_COVERAGE + 0.5), np.float32(_MIN_CONTRAST)
-    for pixel in range(result.size):
-        k = np.uint64(pixel)
-        level = half * (
-            np.float32(pixels[three * k + dark_channel]) + np.float32(pixels[three * k + green])
-        )
-        level -= slope * np.float32(pixels[three * k + bright_channel])
-        floor = half * (
-            np.float32(empty[three * k + dark_channel]) + np.float32(empty[three * k + green])
-        )
-        floor -= slope * np.float32(empty[three * k + bright_channel])
-        share = top - span * level / max(floor, min_contrast)
-        value = np.uint8(min(max(share, lowest), highest))
-        result[k] = value if floor > min_contrast else dark_map[k]
+    # With channels that are constants the loops are vectorised.
+    if bright == _RED_CHANNEL:
+        for pixel in range(result.size):
+            k = np.uint64(pixel)
+            level, floor = _off(pixels, k, 2, 0, slope), _off(empty, k, 2, 0, slope)
+            result[k] = _level(level, floor, dark_map[k])
+    else:
+        for pixel in range(result.size):
+            k = np.uint64(pixel)
+            level, floor = _off(pixels, k, 0, 2, slope), _off(empty, k, 0, 2, slope)
+            result[k] = _level(level, floor, dark_map[k])
+
+
+@inlined
+def _off(
+    pixels: NDArray[np.uint8], k: np.uint64, bright: int, dark: int, slope: np.float32
+) -> np.float32:
+    """Deviation of a pixel of a flat picture from the line of the colour, [gray levels]."""
+    place = np.uint64(3) * k
+    total = np.int32(pixels[place + np.uint64(dark)]) + np.int32(pixels[place + np.uint64(1)])
+    level = np.float32(0.5) * np.float32(total)
+    return np.float32(level - slope * np.float32(pixels[place + np.uint64(bright)]))
+
+
+@inlined
+def _level(level: np.float32, floor: np.float32, darkness: np.uint8) -> np.uint8:
+    """Coverage by the deviations of a pixel and of the floor; darkness where these are small."""
+    least = np.float32(_MIN_CONTRAST)
+    top, span = np.float32(FULL_COVERAGE + 0.5), np.float32(FULL_COVERAGE - NO_COVERAGE)
+    share = top - span * level / max(floor, least)
+    value = np.uint8(min(max(share, np.float32(0.0)), np.float32(255.0)))
+    return value if floor > least else darkness
