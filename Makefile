@@ -44,9 +44,14 @@ SIDE_BY_SIDE := --numprocesses auto --dist loadfile
 # In the order of test/conftest.py; the oldest pytest-xdist sorts files in its own.
 LONGEST_FIRST := $(SIDE_BY_SIDE) --no-loadscope-reorder
 
+# The tests of the nodes mostly wait: meanwhile the next environment is installed, in time that they
+# leave. What fails there is tried again, and said, by test-oldest.
 test: venv ## Run all tests, then those of the core with the oldest dependencies
 	@$(RUN) python -m pytest $(LONGEST_FIRST) $(patsubst %,--ignore=%,$(NODES)) $(PYTEST_ARGS)
-	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS)
+	@nice -n 19 sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt & \
+	    status=0; \
+	    $(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS) || status=$$?; \
+	    wait; exit $$status
 	@$(MAKE) test-oldest
 
 # What takes minutes and only goes through, once more, what other tests go through (or compares a

@@ -5,7 +5,8 @@ or of its own implementation of NumPy: with wrappers for Python and C, optimised
 machine code, and all of that once more as a part of its caller; once more, too, for an argument
 that is a constant, and for callers with other options. Here called functions stay intermediate
 code: one version for the types of the arguments, without wrappers, optimised and translated once,
-with the function that Python calls.
+with the function that Python calls. Only what their callers would otherwise simplify at each call
+is simplified before, see `early_passes`.
 
 numba has no option for that, so its ways to find a called function and to make a library are
 replaced while a function of this package is compiled, under the lock of numba's compiler.
@@ -21,6 +22,8 @@ from weakref import WeakKeyDictionary, WeakSet
 from numba.core import codegen, compiler, dispatcher, event, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.typing import templates
+
+from nanorocks_ros.numerics.early_passes import has_loops, simplify
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -54,6 +57,13 @@ class _Library(codegen.JITCodeLibrary):
 
 class _CalledLibrary(_Library):
     """Intermediate code of a function that compiled functions call, and of those it calls."""
+
+    has_loops = True
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Simplify the code once, instead of in every caller."""
+        if not self.has_loops:
+            simplify(ll_module, self._codegen)
 
     def _optimize_final_module(self) -> None:
         """Leave that to the function that Python calls."""
@@ -158,6 +168,7 @@ def _flags(function: Any) -> Any:
 def _compile(function: Any, args: _Types, flags: Any, kind: type[_Library]) -> Any:
     context = function.targetctx
     library: Any = kind(context.codegen(), function.py_func.__qualname__)
+    library.has_loops = has_loops(function.py_func)
     library.enable_object_caching()
     details = {'dispatcher': function, 'args': args, 'return_type': None}
     with event.trigger_event(COMPILED, data=details):
