@@ -21,6 +21,7 @@ from nanorocks_ros.jobs.folder_lock import lock_folder
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.safe_text import printable
+from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.results_folder import SUMMARY
@@ -126,7 +127,7 @@ class BatchStore:
 
     def _check_place(self) -> None:
         try:
-            has_files = self.folder.exists() and any(self.folder.iterdir())
+            has_files = self.folder.exists() and holds_files(self.folder)
         except OSError as error:
             raise RecordingError(
                 str(self.folder), f'cannot be read ({error.strerror})', 'pass another --output'
