@@ -1,4 +1,4 @@
-"""Files under temporary names: whose process lives, and which a killed process left.
+"""Files and folders under temporary names: whose process lives, and what killed ones left.
 
 A process holds a lock on each file that it writes. The system drops the lock when the process
 ends, however it ends.
@@ -12,14 +12,17 @@ import fcntl
 import os
 import re
 import secrets
+import shutil
+import tempfile
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
+_FOLDER = '.part-'
 _RANDOM_BYTES = 8
 _LONGEST_STEM = 100
 _NAME = re.compile(rf'\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part(\.[^.]+)?', re.DOTALL)
@@ -60,6 +63,57 @@ def open_unfinished(path: Path) -> tuple[Path, int]:
         if os.fstat(lock).st_nlink:
             return part, lock
         os.close(lock)
+
+
+@contextmanager
+def unfinished_folder(parent: Path) -> Iterator[Path]:
+    """A new folder with a hidden name, deleted at the end; those of ended processes go first.
+
+    Parameters
+    ----------
+    parent : Path
+
+    Yields
+    ------
+    Path
+
+    Raises
+    ------
+    OSError
+        When it cannot be made.
+    """
+    for other in parent.glob(f'{_FOLDER}*'):
+        with _lock_of(other) as descriptor:
+            if descriptor is not None and _has_no_process(descriptor):
+                shutil.rmtree(other, ignore_errors=True)
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=_FOLDER, dir=parent))
+        with _lock_of(folder) as descriptor:
+            if descriptor is None:
+                # Another process deleted it before the lock.
+                continue
+            with suppress(OSError):
+                fcntl.flock(descriptor, fcntl.LOCK_EX)
+            if not folder.is_dir():
+                continue
+            try:
+                yield folder
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+            return
+
+
+@contextmanager
+def _lock_of(folder: Path) -> Iterator[int | None]:
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        yield None
+        return
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
 
 
 def delete_unfinished(folder: Path, stem: str = '', suffix: str = '') -> None:
