@@ -44,6 +44,17 @@ _WAITING = 'waiting'
 # Of the name of a folder, of the 255 bytes that file systems take.
 _LONGEST_NAME = 150
 
+# What reading a manifest raises that holds other types and values.
+_WRONG_CONTENT = (
+    OSError,
+    ValueError,
+    OverflowError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RecordingError,
+)
+
 
 @dataclass(slots=True, kw_only=True)
 class Entry:
@@ -259,7 +270,7 @@ class BatchStore:
             return {entry.path: entry for entry in map(_from_json, content['bags'])}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecordingError):
+        except _WRONG_CONTENT:
             self.notices.append(f'{path}: is damaged; recordings are looked at anew')
             return self._from_folders()
 
@@ -314,7 +325,8 @@ def _as_json(entry: Entry) -> dict[str, Any]:
 
 def _from_json(content: dict[str, Any]) -> Entry:
     name = Path(content['folder']).name
-    if not name:
+    # Hidden ones are leftovers of killed workers.
+    if not name or name.startswith('.') or '\0' in name + content['bag']:
         raise ValueError
     return Entry(
         path=Path(content['bag']),
