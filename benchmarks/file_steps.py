@@ -28,7 +28,9 @@ _FAILED, _FINISHED = 1, 0
 _DATE = re.compile(rb'\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?')
 
 
-def run_until(job: Callable[[], object], folder: Path, step: int = 0) -> tuple[int, list[str]]:
+def run_until(
+    job: Callable[[], object], folder: Path, step: int | str = 0
+) -> tuple[int, list[str]]:
     """Run a job in a child process, and kill it before a step.
 
     Parameters
@@ -36,8 +38,8 @@ def run_until(job: Callable[[], object], folder: Path, step: int = 0) -> tuple[i
     job : callable
     folder : Path
         Steps below it count.
-    step : int
-        From 1; 0: to the end.
+    step : int or str
+        Its number, from 1, or a pattern of its text; 0: to the end.
 
     Returns
     -------
@@ -55,7 +57,7 @@ def run_until(job: Callable[[], object], folder: Path, step: int = 0) -> tuple[i
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), steps
 
 
-def _run(job: Callable[[], object], folder: Path, step: int, writer: int) -> None:
+def _run(job: Callable[[], object], folder: Path, step: int | str, writer: int) -> None:
     """The child: run the job and exit."""
     count = 0
     start = os.fspath(folder)
@@ -66,7 +68,7 @@ def _run(job: Callable[[], object], folder: Path, step: int, writer: int) -> Non
         if path:
             count += 1
             os.write(writer, f'{event} {path}\n'.encode(errors='replace'))
-            if count == step:
+            if count == step or (isinstance(step, str) and re.search(step, f'{event} {path}')):
                 os.kill(os.getpid(), signal.SIGKILL)
 
     sys.addaudithook(watch)
