@@ -4,7 +4,7 @@ Each call of the chain is killed before its first step that fits a pattern, and 
 in the same folder. The last one runs to its end. All files are compared, hidden ones too, but for
 the date in them.
 
-``python -m benchmarks reproduction_kills`` takes some minutes: films of 2 s, without searches,
+``python -m benchmarks reproduction_kills`` takes some minutes: films of 3 s, without searches,
 which begin where films are longer.
 """
 
@@ -21,7 +21,7 @@ from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 from nanorocks_ros.studies.reproduction.reproduce_paper import reproduce
 
-_PLAN = CampaignPlan(cycles=1, seconds=2.0)
+_PLAN = CampaignPlan(cycles=1, seconds=3.0)
 _RUNS = 2
 _STEPS = (
     r'os\.mkdir .*/campaign$',

@@ -132,7 +132,7 @@ def delete_unfinished(folder: Path, stem: str = '', suffix: str = '') -> None:
 
 
 def holds_files(folder: Path, *, besides: str = '') -> bool:
-    """Whether a folder holds anything but unfinished files.
+    """Whether a path holds anything but unfinished files; so does one that is no folder.
 
     Parameters
     ----------
@@ -145,6 +145,8 @@ def holds_files(folder: Path, *, besides: str = '') -> bool:
     OSError
         When it cannot be read.
     """
+    if not folder.is_dir():
+        return True
     return any(name != besides and not _NAME.fullmatch(name) for name in os.listdir(folder))
 
 

@@ -92,3 +92,4 @@ def test_a_folder_with_unfinished_files_alone_holds_nothing(tmp_path):
     os.rename(part, tmp_path / 'a.npz')
     os.close(lock)
     assert holds_files(tmp_path)
+    assert holds_files(tmp_path / 'a.npz')

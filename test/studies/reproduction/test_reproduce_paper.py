@@ -139,6 +139,16 @@ def test_a_folder_is_taken_again_after_a_kill_at_any_step_of_its_making(begin, t
     assert kills > 1
 
 
+@pytest.mark.parametrize(
+    'begin', [begin_campaign, cor_figures.prepare_folder, measured_folder.prepare_folder]
+)
+def test_a_file_in_the_place_of_the_folder_is_told(begin, tmp_path):
+    (tmp_path / 'new').write_text('mine')
+    with pytest.raises(RecordingError, match='exists and holds no'):
+        begin(tmp_path / 'new')
+    assert (tmp_path / 'new').read_text() == 'mine'
+
+
 def test_a_cycle_without_its_summary_is_told_before_the_work(tmp_path):
     (tmp_path / 'bouncing_001').mkdir()
     (tmp_path / '.nanorocks_campaign').write_text(json.dumps(SETTINGS))
