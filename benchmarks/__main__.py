@@ -68,6 +68,7 @@ ALL = (
     'gas_statistics',
     'engine',
     'engine_physics',
+    'reproduction_kills',
     'validation',
 )
 

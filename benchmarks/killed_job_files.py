@@ -86,14 +86,9 @@ def messages_of(path: Path) -> str:
 
 
 def whole_folder(path: Path) -> str:
-    """Digest of all files of a folder, without the date when they were made.
-
-    Unfinished files of the killed process have hidden names, and go after an hour.
-    """
+    """Digest of all files of a folder, hidden ones too, without the date when they were made."""
     digest = hashlib.sha256()
     for file in sorted(file for file in path.rglob('*') if file.is_file()):
-        if file.name.startswith('.') and '.part' in file.suffixes:
-            continue
         content = file.read_bytes()
         if file.suffix in _DATED:
             content = _DATE.sub(b'', content)

@@ -15,7 +15,7 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.limits import DIGITS, YAML_BYTES, YAML_DEPTH, YAML_NODES
 
 # The C parser is ten times as fast; PyYAML may be built without it.
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _NUMBER = re.compile(r'[-+0-9_.:xXoOa-fA-F]+')
 _NODES = (yaml.ScalarEvent, yaml.SequenceStartEvent, yaml.MappingStartEvent)
 
@@ -36,7 +36,7 @@ def load_yaml(name: str, text: str) -> Any:
     """
     check_yaml(name, text)
     try:
-        return yaml.load(text, Loader=_LOADER)
+        return yaml.load(text, Loader=LOADER)
     except (yaml.YAMLError, ValueError, OverflowError, RecursionError, TypeError) as error:
         raise ConfigurationError(name, f'not YAML: {_line(error)}', 'correct it') from error
 
@@ -52,7 +52,7 @@ def check_yaml(name: str, text: str) -> None:
     YAML_BYTES.check(len(text), name, ConfigurationError)
     counter = _Counter(name)
     try:
-        for event in yaml.parse(text, Loader=_LOADER):
+        for event in yaml.parse(text, Loader=LOADER):
             counter.add(event)
     except yaml.YAMLError:
         return

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.yaml_limits import check_yaml
+from nanorocks_ros.experiment.yaml_limits import LOADER, check_yaml
 from nanorocks_ros.limits import YAML_BYTES, require_regular_file
 
 
@@ -32,7 +32,7 @@ def parse_yaml(name: str, text: str) -> yaml.Node | None:
     """
     check_yaml(name, text)
     try:
-        return yaml.compose(text, Loader=yaml.SafeLoader)
+        return yaml.compose(text, Loader=LOADER)
     except RecursionError as error:
         raise ConfigurationError(
             name, 'not YAML: nested too deeply', 'write it without such nesting'
@@ -150,7 +150,8 @@ class YamlLines:
         if not isinstance(node, yaml.ScalarNode):
             raise self.error(node, 'expected a single value', 'correct this line')
         try:
-            value = yaml.safe_load(node.value) if node.style is None else node.value
+            # Of plain text the compiled parser gives an empty style.
+            value = node.value if node.style else yaml.safe_load(node.value)
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             raise self.error(node, f'{node.value[:40]!r} cannot be read', 'correct it') from error
         if isinstance(value, dict | list | set):

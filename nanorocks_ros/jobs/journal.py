@@ -17,6 +17,7 @@ from nanorocks_ros.limits import require_regular_file
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import parse_object
 from nanorocks_ros.outputs.npz_archive import Arrays, read_archive, write_archive
+from nanorocks_ros.outputs.unfinished_files import delete_unfinished
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,6 +53,7 @@ class Journal:
         self.notices: list[str] = []
         self._fingerprint = hashlib.sha256(specification.encode()).hexdigest()
         self._lock: int | None = lock_folder(folder)
+        delete_unfinished(folder)
         try:
             self._check_specification(specification)
         except BaseException:
@@ -149,6 +151,7 @@ class Journal:
 
     def delete(self) -> None:
         """Delete the parts and unlock the folder; it stays if it holds anything else."""
+        delete_unfinished(self.folder)
         for path in self._paths():
             path.unlink(missing_ok=True)
         (self.folder / SPECIFICATION).unlink(missing_ok=True)

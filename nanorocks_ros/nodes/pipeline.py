@@ -271,7 +271,8 @@ class PipelineNode(NanorocksNode):
             self._recorder.record_camera_info(camera_info)
 
     def end_recording(self) -> None:
-        """Write what waits, and the index."""
+        """Write what waits, and the index; frames that wait for the trays are left out."""
+        self._background.discard_waiting()
         if self._recorder is not None:
             self._recorder.close()
 

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import os
-import secrets
-import time
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError, RecordingError
+from nanorocks_ros.outputs.unfinished_files import open_unfinished
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
-
-
-# Parts of killed processes are deleted when they are older, [s].
-_OLD_S = 3600.0
-_LONGEST_STEM = 100
 
 
 def check_outputs(
@@ -125,7 +119,7 @@ def atomic_file(path: Path, error_type: type[NanorocksError] = RecordingError) -
         Of `error_type`, when the file cannot be written.
     """
     try:
-        part = _new_part(path)
+        part, lock = open_unfinished(path)
         try:
             yield part
             with part.open('rb+') as stream:
@@ -135,33 +129,13 @@ def atomic_file(path: Path, error_type: type[NanorocksError] = RecordingError) -
         finally:
             with suppress(OSError):
                 part.unlink(missing_ok=True)
+            os.close(lock)
     except OSError as error:
         raise error_type(
             str(path),
             f'cannot be written ({error.strerror or error})',
             'make room, or write elsewhere',
         ) from error
-
-
-def _new_part(path: Path) -> Path:
-    """A new empty file beside a path, under a name that nobody can foresee.
-
-    A name that is known beforehand could be a link that somebody else put there.
-    """
-    start, ending = f'.{path.stem[:_LONGEST_STEM]}.', f'.part{path.suffix}'
-    _delete_old_parts(path.parent, start, ending)
-    part = path.parent / f'{start}{secrets.token_hex(8)}{ending}'
-    os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-    return part
-
-
-def _delete_old_parts(folder: Path, start: str, ending: str) -> None:
-    """Delete what killed processes left; younger files may belong to a process that runs."""
-    with suppress(OSError):
-        for file in folder.iterdir():
-            is_part = file.name.startswith(start) and file.name.endswith(ending)
-            if is_part and time.time() - file.lstat().st_mtime > _OLD_S:
-                file.unlink(missing_ok=True)
 
 
 def _sync_folder(folder: Path) -> None:

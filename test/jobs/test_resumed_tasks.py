@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.file_steps import kill_at_each_step
 from nanorocks_ros.jobs.resumed_tasks import fill_journal, parts_folder, resumed_journal
 from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.outputs.npz_archive import write_archive
 
 HERE = Workers(processes=1)
 TASKS = {f'{number}': number for number in range(5)}
@@ -50,3 +52,16 @@ def test_a_damaged_part_is_reported_and_made_again(tmp_path):
         fill_journal(journal, squared, TASKS, HERE)
         assert int(journal.read('1')['square']) == 1
     assert notices == [f'{part}: is damaged; it is made again']
+
+
+def test_a_job_killed_at_any_step_is_finished_by_the_same_call_and_leaves_nothing(tmp_path):
+    output = tmp_path / 'a.npz'
+
+    def job():
+        with resumed_journal(output, '{}') as journal:
+            fill_journal(journal, squared, TASKS, HERE)
+            write_archive(output, {key: journal.read(key)['square'] for key in TASKS})
+
+    kills, differences = kill_at_each_step(job, tmp_path)
+    assert differences == []
+    assert kills > 6 * len(TASKS)

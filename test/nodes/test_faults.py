@@ -24,6 +24,13 @@ from nanorocks_ros.wire import topics
 
 SMALL = ('width_px:=240', 'height_px:=240', 'first_shake:=0.5', 'frame_rate:=10.0')
 SIZE = 240
+SEPARATE = (
+    'simulator',
+    'preprocessor',
+    'speed_estimator',
+    'cluster_autocorrelator',
+    'haff_fitter',
+)
 # Nodes compile and start on any machine.
 _PATIENCE_S = 150.0
 _QUIET_S = 3.0
@@ -86,6 +93,33 @@ def test_pipeline_and_its_camera_survive_the_loss_of_the_other(graph, fault_tabl
         fault_table(f'`{name}`{other} killed and started again', f'{told} come again', seconds)
     for process in running.values():
         assert graph.interrupt(process).code == 0
+
+
+def test_separate_nodes_start_in_any_order_and_each_may_be_killed(graph, fault_table):
+    results = topics.SPEED, topics.CLUSTER, topics.COR
+    heard = Heard(graph, results)
+    running = {}
+
+    def start(name):
+        # Cycles that are short, so that a node that starts anew sees a whole one soon.
+        parameters = (*SMALL, 'shake_period:=12.0') if name == 'simulator' else ()
+        running[name] = graph.start(name, *parameters)
+
+    def start_from_the_last_to_the_first():
+        for name in reversed(SEPARATE):
+            start(name)
+            graph.until(lambda name=name: name in graph.node.get_node_names(), _PATIENCE_S)
+
+    seconds = heard.after(start_from_the_last_to_the_first, *results)
+    fault_table('separate nodes started in reversed order', 'all results come', seconds)
+    for name in SEPARATE:
+        kill(graph, running[name])
+        seconds = heard.after(lambda name=name: start(name), *results)
+        fault_table(f'separate `{name}` killed and started again', 'all results come', seconds)
+    for process in running.values():
+        ended = graph.interrupt(process)
+        assert ended.code == 0, ended.output
+        assert 'Traceback' not in ended.output
 
 
 def test_every_encoding_gives_the_same_tray_image_and_silence_is_told(graph, fault_table):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
@@ -91,18 +89,6 @@ def test_the_temporary_name_cannot_be_foreseen_and_a_link_is_not_followed(tmp_pa
     path.symlink_to(other)
     write(path, b'new')
     assert (path.read_bytes(), other.read_bytes()) == (b'new', b'kept')
-
-
-def test_what_killed_processes_left_is_deleted_once_it_is_old(tmp_path):
-    old, young = tmp_path / '.a.01ab.part.npz', tmp_path / '.a.02cd.part.npz'
-    for file in (old, young, tmp_path / '.b.01ab.part.npz'):
-        file.touch()
-        os.utime(file, (0, 0))
-    os.utime(young)
-    write(tmp_path / 'a.npz', b'new')
-    assert {file.name for file in tmp_path.iterdir()} == {
-        'a.npz', '.a.02cd.part.npz', '.b.01ab.part.npz'
-    }  # fmt: skip
 
 
 def test_results_are_as_readable_as_other_files(tmp_path):

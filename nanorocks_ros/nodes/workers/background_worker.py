@@ -14,6 +14,7 @@ import queue
 import threading
 from collections import deque
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
@@ -65,11 +66,16 @@ class BackgroundWorker(Generic[Job, Result]):
         self._jobs.join()
         self.deliver_results()
 
+    def discard_waiting(self) -> None:
+        """Leave out the jobs that wait, so that a node that ends has the processor for itself."""
+        with suppress(queue.Empty):
+            while True:
+                self._jobs.get_nowait()
+                self._jobs.task_done()
+
     def close(self) -> None:
         """End the thread; waiting jobs are not done."""
-        while not self._jobs.empty():
-            self._jobs.get_nowait()
-            self._jobs.task_done()
+        self.discard_waiting()
         self._jobs.put(None)
         self._thread.join(_JOIN_S)
 

@@ -16,13 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import zstandard
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2.errors import WriterError
 from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.serde import SerdeError
 
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.recordings.bag.connections import add_connection
+from nanorocks_ros.recordings.bag.metadata_writer import MetadataWriter
 from nanorocks_ros.recordings.mcap.mcap_checksum import add_summary_checksum
 from nanorocks_ros.recordings.messages.message_types import standard_types
 from nanorocks_ros.records import NS
@@ -92,7 +93,7 @@ class BagWriter:
         if self.path.exists():
             raise self._exists()
         try:
-            self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
+            self._writer = MetadataWriter(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
             for key, value in self._metadata.items():
                 self._writer.set_custom_data(key, _encodable(value))

@@ -15,6 +15,7 @@ from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 # Containers whose stated duration is written by the camera; FFmpeg estimates that of others.
 _STATING = ('mov', 'matroska', 'flv', 'asf', 'avi')
@@ -23,6 +24,9 @@ _TOLERANCE, _STEADY_SHARE = 0.1, 0.95
 _GAP, _FEWEST = 1.5, 10
 # Rounding of the stated duration, in frames, and shortest part that counts as missing, [s].
 _FRAMES_OF_ROUNDING, _SHORTEST = 2, 0.2
+# Sizes of the packets of transport streams, with the place of the byte that begins each, [bytes].
+_PACKET_SIZES = {188: 0, 192: 4, 204: 0}
+_SYNC, _PACKETS = b'G', 5
 
 
 class FilmLosses:
@@ -34,10 +38,13 @@ class FilmLosses:
         Number of frames that the film states; 0 if it states none.
     duration : float, [s]
         Duration that it states; 0 if it states none.
+    in_packet : bool
+        Whether it ends in the middle of a packet.
     """
 
-    def __init__(self, expected: int, duration: float) -> None:
+    def __init__(self, expected: int, duration: float, *, in_packet: bool = False) -> None:
         self._expected = expected
+        self._in_packet = in_packet
         self._duration = duration
         self._times_ns = array('q')
         self._packets = 0
@@ -50,6 +57,8 @@ class FilmLosses:
 
     def sentences(self) -> Iterator[str]:
         """What is missing, in sentences; known once the film has been read."""
+        if self._in_packet:
+            yield 'ends in the middle of a packet: it was cut short'
         if self._packets < self._expected:
             yield (
                 f'states {self._expected} frames, {self._packets} are there: it was cut short, or '
@@ -57,7 +66,7 @@ class FilmLosses:
             )
             return
         times = np.unique(np.array(self._times_ns, dtype=np.int64))
-        if times.size < _FEWEST:
+        if times.size < 2:
             return
         steps = np.diff(times)
         step = float(np.median(steps))
@@ -68,7 +77,8 @@ class FilmLosses:
                 f'states {self._duration:.2f} s, {length:.2f} s are there: it was cut short, or '
                 'parts of it are missing'
             )
-        yield from _gaps(steps, step)
+        if times.size >= _FEWEST:
+            yield from _gaps(steps, step)
 
 
 def _gaps(steps: np.ndarray[Any, np.dtype[np.int64]], step: float) -> Iterator[str]:
@@ -80,6 +90,24 @@ def _gaps(steps: np.ndarray[Any, np.dtype[np.int64]], step: float) -> Iterator[s
     if gaps.size:
         frames = int(np.sum(np.rint(gaps / step) - 1))
         yield f'has {gaps.size} gaps, where {frames} frames are missing'
+
+
+def ends_in_packet(path: Path, container: Any) -> bool:
+    """Whether an MPEG transport stream ends in the middle of one of its packets of equal size.
+
+    Parameters
+    ----------
+    path : Path
+    container : object of PyAV
+    """
+    if container.format.name != 'mpegts':
+        return False
+    with path.open('rb') as stream:
+        head = stream.read(_PACKETS * max(_PACKET_SIZES))
+    for size, sync in _PACKET_SIZES.items():
+        if head[sync::size][:_PACKETS] == _SYNC * _PACKETS:
+            return path.stat().st_size % size != 0
+    return False
 
 
 def stated_duration(container: Any, stream: Any) -> float:

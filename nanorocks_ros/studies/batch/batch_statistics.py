@@ -8,9 +8,10 @@ from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.errors import NanorocksError
+from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.html_report import Picture, Section, Table, with_error
+from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.analysis.results_folder import STATISTICS
@@ -139,10 +140,9 @@ def statistics_section(results: Mapping[str, Path]) -> Section | None:
 
 def _read(folder: Path) -> dict[str, dict[str, Any]]:
     try:
-        values = json.loads((folder / STATISTICS).read_text('utf-8'))
-    except (OSError, ValueError):
+        return read_object(folder / STATISTICS)
+    except (OSError, ValueError, RecordingError):
         return {}
-    return values if isinstance(values, dict) else {}
 
 
 def _table(by_tray: Mapping[int, list[tuple[str, dict[str, Any]]]]) -> Table:

@@ -21,6 +21,7 @@ from nanorocks_ros.jobs.folder_lock import lock_folder
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.safe_text import printable
+from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.results_folder import SUMMARY
@@ -42,6 +43,17 @@ _MARK, _NOTES = '.nanorocks_batch', '.under_way'
 _WAITING = 'waiting'
 # Of the name of a folder, of the 255 bytes that file systems take.
 _LONGEST_NAME = 150
+
+# What reading a manifest raises that holds other types and values.
+_WRONG_CONTENT = (
+    OSError,
+    ValueError,
+    OverflowError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RecordingError,
+)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -126,7 +138,7 @@ class BatchStore:
 
     def _check_place(self) -> None:
         try:
-            has_files = self.folder.exists() and any(self.folder.iterdir())
+            has_files = self.folder.exists() and holds_files(self.folder)
         except OSError as error:
             raise RecordingError(
                 str(self.folder), f'cannot be read ({error.strerror})', 'pass another --output'
@@ -258,7 +270,7 @@ class BatchStore:
             return {entry.path: entry for entry in map(_from_json, content['bags'])}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecordingError):
+        except _WRONG_CONTENT:
             self.notices.append(f'{path}: is damaged; recordings are looked at anew')
             return self._from_folders()
 
@@ -313,7 +325,8 @@ def _as_json(entry: Entry) -> dict[str, Any]:
 
 def _from_json(content: dict[str, Any]) -> Entry:
     name = Path(content['folder']).name
-    if not name:
+    # Hidden ones are leftovers of killed workers.
+    if not name or name.startswith('.') or '\0' in name + content['bag']:
         raise ValueError
     return Entry(
         path=Path(content['bag']),

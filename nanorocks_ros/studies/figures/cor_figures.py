@@ -17,6 +17,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
 from nanorocks_ros.studies.decays.best_fit_decay import library_decay
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
@@ -122,7 +123,7 @@ def prepare_folder(folder: Path) -> None:
     RecordingError
         When it holds other files, or cannot be made or written.
     """
-    if folder.exists() and not (folder / _MARK).is_file():
+    if folder.exists() and not (folder / _MARK).is_file() and holds_files(folder):
         raise RecordingError(
             str(folder), 'exists and holds no figures of this command', 'pass another --output'
         )

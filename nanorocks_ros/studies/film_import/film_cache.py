@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import shutil
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,6 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import read_object
+from nanorocks_ros.outputs.unfinished_files import unfinished_folder
 from nanorocks_ros.recordings.bag.find_bags import is_recording
 from nanorocks_ros.recordings.film.image_folder import images_in
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
@@ -84,17 +85,15 @@ def cached_import(film: Path, progress: Callable[[float], None]) -> CachedFilm:
     folder = cache_folder(film)
     bag, record = folder / film.resolve().name, folder / f'{film.resolve().name}.json'
     known = _read(record)
-    if known.get('film') == state and bag.is_dir():
-        return CachedFilm(bag, int(str(known.get('frames', 0))), (), reused=True)
-    part = Path(tempfile.mkdtemp(prefix='.part-', dir=folder))
-    try:
+    frames = known.get('frames')
+    if known.get('film') == state and isinstance(frames, int) and bag.is_dir():
+        return CachedFilm(bag, frames, (), reused=True)
+    with unfinished_folder(folder) as part:
         imported = import_films([film], part / bag.name, ImportSettings(), progress)
         with suppress(FileNotFoundError):
             record.unlink()
         shutil.rmtree(bag, ignore_errors=True)
         os.replace(part / bag.name, bag)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     content = {'film': state, 'frames': imported.frames}
     write_bytes(record, json.dumps(content).encode())
     return CachedFilm(bag, imported.frames, tuple(imported.notices), reused=False)
@@ -113,10 +112,9 @@ def _state(film: Path) -> str:
 def _read(record: Path) -> dict[str, object]:
     """What is known of an import; empty when there is none."""
     try:
-        content = json.loads(record.read_text(encoding='utf-8'))
-    except (OSError, ValueError):
+        return read_object(record)
+    except (OSError, ValueError, RecordingError):
         return {}
-    return content if isinstance(content, dict) else {}
 
 
 def cache_folder(film: Path) -> Path:

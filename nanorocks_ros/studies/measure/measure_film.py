@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.outputs.atomic_files import write_bytes
+from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
 from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
@@ -212,8 +213,8 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     key = tracking_key(plan.bag, plan.settings, plan.image_topic)
     note = plan.folder / f'tray_{number}_decay.json'
     known = _noted(note)
-    if known.get('key') == key:
-        return [str(line) for line in known['lines']]
+    if known.get('key') == key and isinstance(lines := known.get('lines'), list):
+        return [str(line) for line in lines]
     settings = replace(plan.settings, trays=(number,))
     try:
         analysis = measured_decay(plan, replace(step, settings=settings), teller)
@@ -233,7 +234,6 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
 
 def _noted(note: Path) -> dict[str, Any]:
     try:
-        content = json.loads(note.read_text(encoding='utf-8'))
-    except (OSError, ValueError):
+        return read_object(note)
+    except (OSError, ValueError, RecordingError):
         return {}
-    return content if isinstance(content, dict) else {}

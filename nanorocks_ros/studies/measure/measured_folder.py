@@ -13,6 +13,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.table_files import write_package, write_table
+from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.studies.analysis.tracks_files import columns_of
 from nanorocks_ros.studies.measure.measure_tables import tray_tables
 from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ
@@ -79,7 +80,7 @@ def prepare_folder(folder: Path) -> None:
     RecordingError
         When it holds something else, or cannot be made.
     """
-    if folder.exists() and not (folder / MARK).exists() and any(folder.iterdir()):
+    if folder.exists() and not (folder / MARK).exists() and holds_files(folder):
         raise RecordingError(
             str(folder), 'exists and holds no results of `nanorocks measure`', 'pass another -o'
         )

@@ -104,7 +104,7 @@ def saved_tracks(path: Path, settings: PipelineSettings, key: str) -> TrackedBag
             film=film_section(settings.trays_file),
             verdicts=_verdicts(str(arrays['verdicts']), list(trays)),
         )
-    except (RecordingError, KeyError, ValueError, IndexError, TypeError):
+    except (RecordingError, LookupError, ValueError, TypeError, AttributeError, RecursionError):
         # A file that is missing, damaged, or of another version is made again.
         return None
 

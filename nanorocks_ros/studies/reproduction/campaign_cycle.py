@@ -17,12 +17,18 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.settings import CompressionSettings, SceneSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results_folder import write_results
 from nanorocks_ros.studies.analysis.results_json import as_json
-from nanorocks_ros.studies.reproduction.campaign_plan import paper_settings, plate_settings
+from nanorocks_ros.studies.reproduction.campaign_plan import (
+    BOUNCING,
+    STICKING,
+    paper_settings,
+    plate_settings,
+)
 from nanorocks_ros.studies.reproduction.campaign_truth import TrackSampler, film_truth
 from nanorocks_ros.studies.synthetic.film_scene import SceneRecorder
 
@@ -77,7 +83,17 @@ class CycleFiles:
 
 
 def film_and_analyse(task: CycleTask) -> str:
-    """Film and analyse a cycle, and return the name of its folder."""
+    """Film and analyse a cycle, and return the name of its folder.
+
+    Raises
+    ------
+    RecordingError
+        When the folder is there without its summary, or a file cannot be written.
+    """
+    if task.folder.exists():
+        raise RecordingError(
+            str(task.folder), f'has no {SUMMARY}', 'delete it, and run the command again'
+        )
     part = _part_folder(task.folder)
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
@@ -106,7 +122,7 @@ def film_and_analyse(task: CycleTask) -> str:
         'truth': truth.series,
         'tracked': truth.tracked,
     }
-    (part / SUMMARY).write_text(json.dumps(summary), 'utf-8')
+    write_bytes(part / SUMMARY, json.dumps(summary).encode())
     if task.number > 1:
         # A minute of film takes 100 MB; the report needs the film of the first cycle only.
         shutil.rmtree(film)
@@ -133,6 +149,13 @@ def part_done(folder: Path) -> float:
 
 def _part_folder(folder: Path) -> Path:
     return folder.with_name(f'.{folder.name}.part')
+
+
+def delete_unfinished_cycles(folder: Path) -> None:
+    """Delete what killed processes left of the cycles of a campaign that no process makes."""
+    for kind in (BOUNCING, STICKING):
+        for part in folder.glob(_part_folder(folder / f'{kind}_*').name):
+            shutil.rmtree(part, ignore_errors=True)
 
 
 def is_finished(folder: Path) -> bool:

@@ -25,7 +25,7 @@ from nanorocks_ros.studies.reproduction.chapters.rotation_chapter import rotatio
 from nanorocks_ros.studies.reproduction.chapters.simulation_chapter import simulation_chapter
 from nanorocks_ros.studies.reproduction.chapters.speed_chapter import speed_chapter
 from nanorocks_ros.studies.reproduction.report_head import conclusion, differences, limits, summary
-from nanorocks_ros.studies.reproduction.simulated_campaign import prepare_campaign, run_campaign
+from nanorocks_ros.studies.reproduction.simulated_campaign import open_campaign, run_campaign
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,34 +82,34 @@ def reproduce(
     Raises
     ------
     RecordingError
-        When the folder holds other files, or cannot be written.
+        When the folder holds other files, is in use, or cannot be written.
     KeyboardInterrupt
         On Ctrl-C; finished cycles are kept.
     """
-    prepare_campaign(folder, plan)
-    cycles = run_campaign(folder, plan, workers, lambda done: progress('films', done))
-    pictures = folder / PICTURES
-    pictures.mkdir(exist_ok=True)
-    chapters = []
-    for name in _CHAPTERS:
-        context = Context(
-            folder=pictures,
-            plan=plan,
-            cycles=cycles,
-            workers=workers,
-            runs=runs,
-            notice=notice,
-            progress=partial(progress, name),
+    with open_campaign(folder, plan):
+        cycles = run_campaign(folder, plan, workers, lambda done: progress('films', done))
+        pictures = folder / PICTURES
+        pictures.mkdir(exist_ok=True)
+        chapters = []
+        for name in _CHAPTERS:
+            context = Context(
+                folder=pictures,
+                plan=plan,
+                cycles=cycles,
+                workers=workers,
+                runs=runs,
+                notice=notice,
+                progress=partial(progress, name),
+            )
+            chapters.append(_make_chapter(name, context))
+        path = folder / REPORT
+        write_report(
+            path,
+            'NanoRocks, reproduced',
+            conclusion(chapters),
+            [differences(chapters), limits(), *(chapter.section for chapter in chapters)],
+            made=summary(folder, plan, runs),
         )
-        chapters.append(_make_chapter(name, context))
-    path = folder / REPORT
-    write_report(
-        path,
-        'NanoRocks, reproduced',
-        conclusion(chapters),
-        [differences(chapters), limits(), *(chapter.section for chapter in chapters)],
-        made=summary(folder, plan, runs),
-    )
     return path
 
 

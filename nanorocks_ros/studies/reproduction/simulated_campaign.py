@@ -9,15 +9,20 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 from __future__ import annotations
 
 import json
+import os
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.folder_lock import lock_folder
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
+from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.studies.reproduction.campaign_cycle import (
     CycleFiles,
+    delete_unfinished_cycles,
     film_and_analyse,
     is_finished,
     part_done,
@@ -25,38 +30,57 @@ from nanorocks_ros.studies.reproduction.campaign_cycle import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
-# A file of this name marks the folder of a campaign.
-_MARK = '.nanorocks_campaign'
+# A file of this name marks the folder of a campaign; the other is locked by its process.
+_MARK, _LOCK = '.nanorocks_campaign', '.lock'
 
 
-def prepare_campaign(folder: Path, plan: CampaignPlan) -> None:
-    """Make the folder of a campaign, or reuse that of an interrupted one.
+@contextmanager
+def open_campaign(folder: Path, plan: CampaignPlan) -> Iterator[None]:
+    """Make the folder of a campaign, or reuse that of an interrupted one; one process at a time.
 
     Raises
     ------
     RecordingError
-        When it holds other files or a campaign of another plan, or cannot be written.
+        When it holds other files or a campaign of another plan, is in use, or cannot be written.
     """
-    mark = folder / _MARK
-    settings = {key: value for key, value in asdict(plan).items() if key != 'cycles'}
-    try:
-        if folder.exists() and not mark.is_file() and any(folder.iterdir()):
+    with _folder_errors(folder):
+        is_campaign = not folder.exists() or (folder / _MARK).is_file()
+        if not is_campaign and holds_files(folder, besides=_LOCK):
             raise RecordingError(
                 str(folder), 'exists and holds no campaign', 'pass another --output'
             )
-        folder.mkdir(parents=True, exist_ok=True)
-        if mark.is_file() and read_object(mark) != settings:
-            raise RecordingError(
-                str(folder),
-                'holds a campaign of other settings',
-                'pass another --output, or the settings of that campaign',
-            )
-        write_bytes(mark, json.dumps(settings).encode())
+    lock = lock_folder(folder, _LOCK)
+    try:
+        with _folder_errors(folder):
+            _mark(folder, plan)
+        delete_unfinished_cycles(folder)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _mark(folder: Path, plan: CampaignPlan) -> None:
+    """Write the plan into the folder, or compare it with the plan that is there."""
+    mark = folder / _MARK
+    settings = {key: value for key, value in asdict(plan).items() if key != 'cycles'}
+    if mark.is_file() and read_object(mark) != settings:
+        raise RecordingError(
+            str(folder),
+            'holds a campaign of other settings',
+            'pass another --output, or the settings of that campaign',
+        )
+    write_bytes(mark, json.dumps(settings).encode())
+
+
+@contextmanager
+def _folder_errors(folder: Path) -> Iterator[None]:
+    try:
+        yield
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else 'its mark is damaged'
         raise RecordingError(
@@ -72,7 +96,7 @@ def run_campaign(
     Parameters
     ----------
     folder : Path
-        From `prepare_campaign`.
+        Inside of `open_campaign`.
     plan : CampaignPlan
     workers : Workers
     progress : callable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from contextlib import closing, nullcontext
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -120,6 +120,10 @@ def _existing_result(plan: SweepPlan, output: Path) -> Sweep | None:
         raise RecordingError(str(output), f'holds another sweep ({text})', remedy)
     if plan.keep_runs and existing.run_mean_speed is None:
         raise RecordingError(str(output), 'holds no single runs', remedy)
+    if parts_folder(output).is_dir():
+        # A kill came between the result and the end of its parts.
+        with suppress(RecordingError), Journal(parts_folder(output), plan.specification()) as left:
+            left.delete()
     return existing
 
 

@@ -13,7 +13,13 @@ import yaml
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import (
+    CompressionFormat,
+    CompressionMode,
+    Reader,
+    StoragePlugin,
+    Writer,
+)
 from rosbags.typesys import Stores, get_typestore
 
 from nanorocks_ros.errors import RecordingError
@@ -52,6 +58,42 @@ def test_the_reader_of_rosbags_deserializes_the_messages(tmp_path, record):
     assert np.isnan(messages[0].data[1])
     dimension = messages[0].layout.dim[0]
     assert (dimension.label, dimension.size, dimension.stride) == ('time,cycle', 2, 2)
+
+
+def copied_by_rosbags(ours, path):
+    """A copy of a recording by the writer of rosbags; the text of its metadata."""
+    text = (ours / 'metadata.yaml').read_text('utf-8')
+    custom = yaml.safe_load(text)['rosbag2_bagfile_information']['custom_data']
+    theirs = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+    theirs.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    for key, value in custom.items():
+        theirs.set_custom_data(key, value)
+    with Reader(ours) as bag, theirs:
+        copies = {
+            connection.id: theirs.add_connection(
+                connection.topic,
+                connection.msgtype,
+                msgdef=connection.msgdef.data,
+                rihs01=connection.digest,
+                offered_qos_profiles=connection.ext.offered_qos_profiles,
+            )
+            for connection in sorted(bag.connections, key=lambda each: each.id)
+        }
+        for connection, stamp, raw in bag.messages():
+            theirs.write(copies[connection.id], stamp, raw)
+    return (path / 'metadata.yaml').read_text('utf-8')
+
+
+def test_the_metadata_are_those_that_the_writer_of_rosbags_writes(tmp_path, record):
+    ours = record(tmp_path / 'first' / 'run', frames=3)
+    wanted = yaml.safe_load(copied_by_rosbags(ours, tmp_path / 'second' / 'run'))
+    whole = yaml.safe_load((ours / 'metadata.yaml').read_text('utf-8'))
+    assert whole == wanted
+    # The file itself holds them, too.
+    with next(ours.glob('*.mcap')).open('rb') as stream:
+        (record,) = list(make_reader(stream).iter_metadata())
+    inner = yaml.safe_load(record.metadata['serialized_metadata'])
+    assert {'rosbag2_bagfile_information': inner} == whole
 
 
 def test_metadata_holds_the_offered_qos(tmp_path, record):

@@ -47,6 +47,27 @@ def test_a_whole_film_lacks_nothing(tmp_path, suffix):
     assert (count, film.losses, film.damaged) == (FRAMES, (), 0)
 
 
+def test_a_film_of_which_a_few_frames_are_left_is_told(tmp_path):
+    path = write(tmp_path / 'x.mkv', 'libx264', {'g': '4', 'bf': '0'})
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 15])
+    film, count = read(path)
+    assert 2 <= count < 10
+    assert 'states 3.00 s' in film.losses[0]
+
+
+@pytest.mark.parametrize(('cut', 'told'), [(0, ()), (40 * 188, ()), (40 * 188 + 77, (
+    'ends in the middle of a packet: it was cut short',
+))])  # fmt: skip
+def test_a_transport_stream_that_ends_within_a_packet_was_cut(tmp_path, cut, told):
+    path = write(tmp_path / 'x.ts', 'libx264', {'g': '15', 'bf': '0'})
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) - cut])
+    film, count = read(path)
+    assert 10 <= count <= FRAMES
+    assert film.losses == told
+
+
 @pytest.mark.parametrize('share', [0.3, 0.5, 0.9])
 @pytest.mark.parametrize('suffix', ['avi', 'mkv'])
 def test_a_film_cut_short_is_told(tmp_path, suffix, share):

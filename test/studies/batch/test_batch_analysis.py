@@ -31,6 +31,7 @@ from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.result_tables import read_columns
 from nanorocks_ros.studies.batch import batch_task
 from nanorocks_ros.studies.batch.batch_analysis import BagResults, BatchPlan, run_batch
+from nanorocks_ros.studies.batch.batch_store import BatchStore
 from nanorocks_ros.studies.batch.campaign_means import combined
 from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
 from nanorocks_ros.studies.film_import.import_film import import_films
@@ -274,6 +275,35 @@ def test_one_name_twice_what_changed_what_moved_and_a_lost_manifest(tiny, tmp_pa
     other = with_values(PipelineSettings(), {'speed.interval': 0.2}, 'test')
     _, watcher = batch_of(out, bags / 'three', settings=other)
     assert watcher.outcomes['three'].frames == 12
+
+
+@pytest.mark.parametrize(
+    'wrong',
+    [
+        {'files': [['a', float('inf'), 0, 0, 0]]},
+        {'folder': '..'},
+        {'folder': '.hidden'},
+        {'folder': 'a\0b'},
+        {'bag': '/a\0b'},
+        {'files': 3},
+    ],
+    ids=str,
+)
+def test_a_manifest_of_other_values_is_damaged(tmp_path, wrong):
+    def opened():
+        return BatchStore(tmp_path / 'out', PipelineSettings(), '')
+
+    with opened() as store:
+        store.write()
+    path = tmp_path / 'out' / 'manifest.json'
+    entry = {'bag': '/a', 'folder': 'a', 'state': 'done', 'reason': '', 'content': '', 'files': []}
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps({**content, 'bags': [entry]}))
+    with opened() as store:
+        assert store.notices == []
+    path.write_text(json.dumps({**content, 'bags': [{**entry, **wrong}]}))
+    with opened() as store:
+        assert 'is damaged' in store.notices[0]
 
 
 def test_a_worker_that_is_killed_costs_its_own_bag_and_no_other(tiny, tmp_path):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 
 import pytest
 from videos import write_video
 
+from benchmarks.file_steps import kill_at_each_step
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.film_import import film_cache
@@ -48,11 +50,29 @@ def test_an_interrupted_import_leaves_nothing_and_the_next_one_is_whole(tmp_path
     assert imported(film).frames == 8
 
 
+def test_an_import_killed_at_any_step_is_made_by_the_next_call_and_leaves_nothing(tmp_path):
+    write_video(tmp_path / 'a.avi', range(3))
+    folder = tmp_path / 'films'
+    folder.mkdir()
+
+    def job():
+        film = folder / 'a.avi'
+        if not film.exists():
+            shutil.copy2(tmp_path / 'a.avi', film)
+        imported(film)
+
+    kills, differences = kill_at_each_step(job, folder)
+    assert differences == []
+    assert kills > 10
+
+
 def test_a_damaged_note_of_the_import_makes_a_new_one(tmp_path):
     film = write_video(tmp_path / 'a.avi', range(4))
     note = tmp_path / CACHE / 'a.avi.json'
     imported(film)
-    for content in ('', '[]', '{"film": 1}'):
+    known = json.loads(note.read_text())
+    wrong_count = json.dumps({**known, 'frames': 'four'})
+    for content in ('', '[]', '{"film": 1}', '[' * 100_000, wrong_count):
         note.write_text(content)
         assert not imported(film).reused
 

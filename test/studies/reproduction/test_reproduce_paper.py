@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 
 import pytest
 
 import nanorocks_ros as nr
+from benchmarks.file_steps import kill_at_each_step
 from nanorocks_ros import __version__
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.experiment.paper_values import PAPER_PEAK_SPEED
 from nanorocks_ros.jobs.tasks import Workers
+from nanorocks_ros.studies.figures import cor_figures
+from nanorocks_ros.studies.measure import measured_folder
 from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan, plate_settings
 from nanorocks_ros.studies.reproduction.reproduce_paper import reproduce
 from nanorocks_ros.studies.reproduction.simulated_campaign import (
+    open_campaign,
     parts_done,
-    prepare_campaign,
     run_campaign,
 )
 
 PLAN = CampaignPlan(cycles=1, seconds=3.0, seed=2)
+SETTINGS = {name: value for name, value in asdict(PLAN).items() if name != 'cycles'}
 ALONE = Workers(processes=1)
 
 
@@ -28,13 +33,15 @@ ALONE = Workers(processes=1)
 def campaign(tmp_path_factory):
     """A folder with a short campaign."""
     folder = tmp_path_factory.mktemp('campaign') / 'new'
-    prepare_campaign(folder, PLAN)
-    # The part of a cycle that an interrupted call left.
-    interrupted = folder / '.sticking_001.part'
-    interrupted.mkdir()
-    (interrupted / 'done').write_text('0.4')
+    # The parts of cycles that an interrupted call of more cycles left.
+    for name in ('.sticking_001.part', '.sticking_002.part'):
+        (folder / name).mkdir(parents=True)
+        (folder / name / 'done').write_text('0.4')
+    (folder / '.nanorocks_campaign').write_text(json.dumps(SETTINGS))
     assert parts_done(folder, PLAN) == pytest.approx(0.2)
-    run_campaign(folder, PLAN, ALONE, lambda done: None)
+    with open_campaign(folder, PLAN):
+        assert parts_done(folder, PLAN) == 0.0
+        run_campaign(folder, PLAN, ALONE, lambda done: None)
     return folder
 
 
@@ -94,13 +101,59 @@ def test_the_report_has_all_chapters_even_with_short_films(campaign):
 
 
 def test_a_folder_with_other_files_or_another_plan_is_not_changed(campaign, tmp_path):
+    def opened(folder, plan):
+        with open_campaign(folder, plan):
+            pass
+
     with pytest.raises(RecordingError, match='other settings'):
-        prepare_campaign(campaign, CampaignPlan(cycles=1, seconds=5.0))
+        opened(campaign, CampaignPlan(cycles=1, seconds=5.0))
     (tmp_path / 'mine.txt').write_text('')
     with pytest.raises(RecordingError, match='holds no campaign'):
-        prepare_campaign(tmp_path, PLAN)
+        opened(tmp_path, PLAN)
+    assert [path.name for path in tmp_path.iterdir()] == ['mine.txt']
     # A later call may add cycles.
-    prepare_campaign(campaign, CampaignPlan(cycles=5, seconds=3.0, seed=2))
+    opened(campaign, CampaignPlan(cycles=5, seconds=3.0, seed=2))
+
+
+def test_one_process_at_a_time_makes_a_campaign(tmp_path):
+    folder = tmp_path / 'new'
+    with (
+        open_campaign(folder, PLAN),
+        pytest.raises(RecordingError, match='is in use by another process'),
+        open_campaign(folder, PLAN),
+    ):
+        pass
+
+
+def begin_campaign(folder):
+    with open_campaign(folder, PLAN):
+        pass
+
+
+@pytest.mark.parametrize(
+    'begin', [begin_campaign, cor_figures.prepare_folder, measured_folder.prepare_folder]
+)
+def test_a_folder_is_taken_again_after_a_kill_at_any_step_of_its_making(begin, tmp_path):
+    kills, differences = kill_at_each_step(lambda: begin(tmp_path / 'new'), tmp_path)
+    assert differences == []
+    assert kills > 1
+
+
+@pytest.mark.parametrize(
+    'begin', [begin_campaign, cor_figures.prepare_folder, measured_folder.prepare_folder]
+)
+def test_a_file_in_the_place_of_the_folder_is_told(begin, tmp_path):
+    (tmp_path / 'new').write_text('mine')
+    with pytest.raises(RecordingError, match='exists and holds no'):
+        begin(tmp_path / 'new')
+    assert (tmp_path / 'new').read_text() == 'mine'
+
+
+def test_a_cycle_without_its_summary_is_told_before_the_work(tmp_path):
+    (tmp_path / 'bouncing_001').mkdir()
+    (tmp_path / '.nanorocks_campaign').write_text(json.dumps(SETTINGS))
+    with pytest.raises(RecordingError, match=r'bouncing_001: has no summary\.json; delete it'):
+        reproduce(tmp_path, PLAN, ALONE, 2, lambda name, done: None, lambda text: None)
 
 
 @pytest.mark.parametrize(

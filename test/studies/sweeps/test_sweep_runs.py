@@ -175,6 +175,20 @@ def test_a_finished_sweep_is_not_done_again(tmp_path, straight):
     assert reported == []
 
 
+def test_a_finished_sweep_deletes_its_parts_that_a_kill_left_but_no_others(tmp_path, straight):
+    output = tmp_path / 'sweep.npz'
+    interrupted(output, after=30)
+    straight.save(output)
+    assert_same(sweep(PLAN, output, HERE), straight)
+    assert [path.name for path in tmp_path.iterdir()] == ['sweep.npz']
+    other = sweep_plan(SETTINGS, AXES, TIMES, 21, keep_runs=True)
+    output.unlink()
+    interrupted(output, after=30, plan=other)
+    straight.save(output)
+    assert_same(sweep(PLAN, output, HERE), straight)
+    assert parts_folder(output).is_dir()
+
+
 def test_the_file_of_another_sweep_is_not_overwritten(tmp_path):
     output = tmp_path / 'a.npz'
     few = replace(PLAN, runs=2)
