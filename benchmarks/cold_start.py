@@ -13,9 +13,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 _ANALYSE = """
 import sys
-from nanorocks_ros.numerics import compiled
+from nanorocks_ros.numerics import lean_compilation
 if {by_numba}:
-    compiled.compile_lean = lambda function: None
+    lean_compilation.compile_lean = lambda function: None
 from nanorocks_ros.cli.main import main
 sys.exit(main(['analyse', 'bags/tray_1_sample', '--no-output']))
 """
