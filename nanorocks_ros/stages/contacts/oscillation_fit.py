@@ -10,6 +10,7 @@ Tested by ``test/stages/contacts/test_tray_history.py``.
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -21,12 +22,11 @@ from nanorocks_ros.numerics.compiled import compiled
 _FREQUENCIES = np.geomspace(0.5, 6.0, 40)
 # Smallest part of a term that is independent of the terms before it.
 _MIN_PIVOT = 1e-4
-
-
-# Speeds of a swing that tell its decay: over the largest, and their least number and time [s].
-_LARGE_SPEED, _FEWEST_SPEEDS, _LEAST_TIME = 0.25, 4, 1.5
-# A speed so many times the largest one belongs to another swing.
-_NEW_SWING = 1.2
+# Speeds of a swing that tell its decay: over the largest, their least and largest number, and
+# their least time [s].
+_LARGE_SPEED, _FEWEST_SPEEDS, _MOST_SPEEDS, _LEAST_TIME = 0.25, 4, 60, 1.5
+# A speed so many times the largest one, or the expected one, belongs to another swing.
+_NEW_SWING = 1.5
 
 
 class Slope(NamedTuple):
@@ -67,17 +67,19 @@ class SwingDecay:
     """How fast a tray swings that comes to rest, by the time in which it swung far."""
 
     def __init__(self) -> None:
-        self._times: list[float] = []
-        self._speeds: list[float] = []
+        self._times: deque[float] = deque(maxlen=_MOST_SPEEDS)
+        self._speeds: deque[float] = deque(maxlen=_MOST_SPEEDS)
         self._slope = self._start = math.nan
 
     def push(self, time: float, speed: float) -> None:
         """Take the root mean square of a component at another time, [s], [m/s]."""
         largest = max(self._speeds, default=0.0)
-        if speed > _NEW_SWING * largest:
-            self._times, self._speeds, self._slope = [], [], math.nan
-        elif speed < _LARGE_SPEED * largest:
+        if speed < _LARGE_SPEED * largest:
             return
+        if speed > _NEW_SWING * (self.speed(time) or largest):
+            self._times.clear()
+            self._speeds.clear()
+            self._slope = math.nan
         self._times.append(time)
         self._speeds.append(speed)
         times = np.array(self._times)

@@ -137,8 +137,9 @@ class TrayHistory:
 
     def _watch_swing(self) -> None:
         """Remember how fast the tray swings in the last frames, where it does."""
-        times, displacements = self._times[-_WIDE_FRAMES:], self._displacements[-_WIDE_FRAMES:]
-        if times.size < _WIDE_FRAMES:
+        frames = 2 * _WIDE_FRAMES
+        times, displacements = self._times[-frames:], self._displacements[-frames:]
+        if times.size < frames:
             return
         middle = 0.5 * float(times[0] + times[-1])
         fits = _Fits(times - middle, displacements)

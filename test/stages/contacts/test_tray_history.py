@@ -99,8 +99,11 @@ def test_another_swing_begins_the_memory_anew():
     for time in np.arange(0.0, 6.0, 0.3):
         swing.push(time, 1e-3 * math.exp(-0.3 * time))
     assert swing.speed(10.0) == pytest.approx(1e-3 * math.exp(-3.0))
-    swing.push(20.0, 2e-3)
+    swing.push(20.0, 0.9e-3)
     assert swing.speed(21.0) == 0.0
+    for time in np.arange(20.3, 23.0, 0.3):
+        swing.push(time, 0.9e-3 * math.exp(-0.2 * (time - 20.0)))
+    assert swing.speed(30.0) == pytest.approx(0.9e-3 * math.exp(-2.0))
 
 
 def test_a_swing_that_does_not_cease_is_not_continued():
