@@ -1,11 +1,13 @@
 """Films by other code, altered as other cameras, recorders and users would: right or flagged?
 
 Each film keeps its physics and its truth; picture, codec, clock, or what the user says of it
-changes. Results stand beside those of the film as it is.
+changes. Results stand beside those of the film as it is. ``NANOROCKS_ALTERATION`` selects the
+alterations whose names contain it.
 """
 
 from __future__ import annotations
 
+import os
 import tempfile
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -156,7 +158,9 @@ def report() -> None:
     if not videos:
         print(f'No films by other code: set {FOREIGN} to a folder that holds some.')
         return
-    tasks = {f'{video.stem}: {name}': (video, name) for video in videos for name in ALTERATIONS}
+    selected = os.environ.get('NANOROCKS_ALTERATION', '')
+    names = [name for name in ALTERATIONS if selected in name]
+    tasks = {f'{video.stem}: {name}': (video, name) for video in videos for name in names}
     with Progress('altered films') as progress:
         rows = run_tasks(_row, tasks, Workers(), progress.count)
     print_heading()

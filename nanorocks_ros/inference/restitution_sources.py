@@ -176,7 +176,7 @@ def restitution_sources(
         For a wall prior outside the range of the library.
     """
     walls = prior.min_wall_restitution, prior.max_wall_restitution
-    slowing = Slowing.by_drag(losses.drag) if losses else NO_SLOWING
+    slowing = losses.slowing if losses else NO_SLOWING
     bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
     wall_likelihood = contacts.wall_likelihood(prior.rebound_bias, slowing)
     joint = posterior_of(
@@ -191,8 +191,10 @@ def restitution_sources(
     headline = headline_of(number, joint.tension, friction)
     if dependence.is_seen or not decay_counts:
         headline = Headline.CONTACTS
+    drag = losses.drag if losses else UNKNOWN_MEASURED
     if headline is Headline.CONTACTS:
         slowing = losses.rubbed if losses else NO_SLOWING
+        drag = slowing.drag if losses else UNKNOWN_MEASURED
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
         wall_likelihood = _with_friction(contacts, prior, slowing)
     return RestitutionSources(
@@ -202,7 +204,7 @@ def restitution_sources(
         walls=wall_likelihood.posterior(walls) if wall_likelihood else None,
         wall_friction=friction,
         headline=headline,
-        drag=slowing.drag if losses else UNKNOWN_MEASURED,
+        drag=drag,
         dependence=dependence,
     )
 

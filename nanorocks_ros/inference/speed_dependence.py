@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.records import Interval
 from nanorocks_ros.records.headlines import walls_rub
 
@@ -105,7 +104,7 @@ def speed_dependence(
         Its systematic errors of contacts may be this much more for each factor e in speed.
     """
     rubbed = walls_rub(contacts.wall_friction)
-    slowing = losses.rubbed if rubbed else Slowing.by_drag(losses.drag)
+    slowing = losses.rubbed if rubbed else losses.slowing
     return SpeedDependence(
         beads=contacts.bead_exponent(prior.collision_bias, slowing),
         walls=contacts.wall_exponent(prior.rebound_bias, slowing),

@@ -85,6 +85,7 @@ class Quality(IntFlag):
     ACCELERATED = 8192
     SPEED_DEPENDENT = 16384
     STICKING = 32768
+    SKIPPED_FRAMES = 65536
 
     def names(self) -> list[str]:
         """Names of the flags that are set, in lower case."""

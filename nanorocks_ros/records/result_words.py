@@ -121,6 +121,11 @@ FLAGS = {
         'ten',
         'nothing needs to be done; onset, body_rebounds and sticking_speed say more',
     ),
+    Quality.SKIPPED_FRAMES: Words(
+        'all beads move by several steps at once in more than 4 % of the frames: frames are '
+        'missing that the time stamps do not show',
+        'give the frames the times at which they were taken, or film again without losses',
+    ),
 }
 """Meaning and remedy of each flag."""
 

@@ -18,6 +18,7 @@ from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
+from nanorocks_ros.inference.flights.flight_losses import FlightLosses, Slowing
 from nanorocks_ros.inference.likelihood_1d import Posterior1D
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.inference.restitution_sources import restitution_sources
@@ -62,6 +63,27 @@ def test_where_decay_and_contacts_agree_both_count(tables):
         float(sources.decay.quantiles(ENDS)[0]), abs=1e-12
     )
     assert alone.beads is alone.walls is None
+
+
+def test_a_drag_below_0_by_chance_does_not_lower_the_walls(tables):
+    seen = wall_rebounds(np.random.default_rng(1), 60, 2.0, 17.0, 0.97)
+    times = {'incoming_drag_time': 0.3, 'outgoing_drag_time': 0.3}
+    contacts = ContactTerms.of([replace(rebound, **times) for rebound in seen])
+    walls = []
+    for drag in (-0.01, 0.0):
+        unknown = np.full(2, np.nan)
+        losses = FlightLosses(
+            drag=Measured(drag, 0.002),
+            acceleration=unknown,
+            covariance=np.full((2, 2), np.nan),
+            rubbed=Slowing.by_drag(Measured(0.0, 0.002)),
+        )
+        sources = restitution_sources(
+            tables, decay(tables, 0.89, 0.97), contacts, PRIOR, losses=losses
+        )
+        assert sources.drag.value == drag
+        walls.append(sources.intervals(ENDS)[1].value)
+    assert walls[0] == pytest.approx(walls[1], abs=1e-9)
 
 
 def test_where_they_do_not_only_the_contacts_count(tables):

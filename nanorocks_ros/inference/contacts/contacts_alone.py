@@ -113,15 +113,14 @@ def contacts_alone(
     losses = flight_losses(flight_table(flights), Measured(prior.drag, prior.drag_error))
     # With fewer flights the prior alone would speak, which is that of a gas at low pressure.
     is_measured = losses.flights >= MIN_FLIGHTS
-    drag = max(losses.drag.value if is_measured else prior.drag, 0.0)
-    own = [_complete(dragged(contact, drag)) for contact in contacts]
+    slowing = losses.slowing if is_measured else Slowing.by_drag(Measured(prior.drag, 0.0))
+    own = [_complete(dragged(contact, slowing.drag.value)) for contact in contacts]
     rebounds = [contact for contact in own if isinstance(contact, Rebound)]
     collisions = [
         contact
         for contact in own
         if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
     ]
-    slowing = Slowing.by_drag(losses.drag if is_measured else Measured(drag, 0.0))
     numbers = sorted({rebound.wall for rebound in rebounds})
 
     def walls(some: Sequence[Rebound]) -> RestitutionOfContacts:

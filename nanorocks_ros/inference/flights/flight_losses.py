@@ -106,6 +106,14 @@ class FlightLosses:
     rubbed: Slowing
 
     @property
+    def slowing(self) -> Slowing:
+        """The drag as what slows beads without friction: a gas does not speed them up.
+
+        The error stays: a drag that came out below 0 is no better known.
+        """
+        return Slowing.by_drag(Measured(max(self.drag.value, 0.0), self.drag.error))
+
+    @property
     def is_accelerated(self) -> bool:
         """Whether the acceleration is not 0."""
         if not np.isfinite(self.covariance).all():

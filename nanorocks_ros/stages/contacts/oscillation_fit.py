@@ -1,11 +1,16 @@
 """Fits of polynomials and damped oscillations to tray positions, for the velocity at one time.
 
+A codec leaves out small motion: where the tray swings by less than half a pixel its swing is seen
+too small, or not at all, and no noise tells so. `SwingDecay` remembers how the swing ceased while
+it was large.
+
 Tested by ``test/stages/contacts/test_tray_history.py``.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +22,11 @@ from nanorocks_ros.numerics.compiled import compiled
 _FREQUENCIES = np.geomspace(0.5, 6.0, 40)
 # Smallest part of a term that is independent of the terms before it.
 _MIN_PIVOT = 1e-4
+# Speeds of a swing that tell its decay: over the largest, their least and largest number, and
+# their least time [s].
+_LARGE_SPEED, _FEWEST_SPEEDS, _MOST_SPEEDS, _LEAST_TIME = 0.25, 4, 60, 1.5
+# A speed so many times the largest one, or the expected one, belongs to another swing.
+_NEW_SWING = 1.5
 
 
 class Slope(NamedTuple):
@@ -29,19 +39,58 @@ class Slope(NamedTuple):
         Sum of the squared residuals.
     error_factor : float, [1/s]
         Error of the slope over the error of a position.
+    fitted : ndarray (frames, 2), [m]
     """
 
     velocity: NDArray[np.float64]
     residual: float
     error_factor: float
+    fitted: NDArray[np.float64]
 
 
 def fit_slope(terms: NDArray[np.float64], positions: NDArray[np.float64]) -> Slope:
     """Fit terms, (frames, n); only the second has a slope at time 0, and it is 1."""
     inverse = np.linalg.pinv(terms)
     coefficients = inverse @ positions
-    residual = float(np.sum((positions - terms @ coefficients) ** 2))
-    return Slope(coefficients[1], residual, float(np.linalg.norm(inverse[1])))
+    fitted = terms @ coefficients
+    residual = float(np.sum((positions - fitted) ** 2))
+    return Slope(coefficients[1], residual, float(np.linalg.norm(inverse[1])), fitted)
+
+
+def swing_speed(times: NDArray[np.float64], fitted: NDArray[np.float64]) -> float:
+    """Root mean square of a component of the velocity of fitted positions, (frames, 2), [m/s]."""
+    velocities = np.diff(fitted, axis=0) / np.diff(times)[:, np.newaxis]
+    return math.sqrt(float(np.mean(velocities**2)))
+
+
+class SwingDecay:
+    """How fast a tray swings that comes to rest, by the time in which it swung far."""
+
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=_MOST_SPEEDS)
+        self._speeds: deque[float] = deque(maxlen=_MOST_SPEEDS)
+        self._slope = self._start = math.nan
+
+    def push(self, time: float, speed: float) -> None:
+        """Take the root mean square of a component at another time, [s], [m/s]."""
+        largest = max(self._speeds, default=0.0)
+        if speed < _LARGE_SPEED * largest:
+            return
+        if speed > _NEW_SWING * (self.speed(time) or largest):
+            self._times.clear()
+            self._speeds.clear()
+            self._slope = math.nan
+        self._times.append(time)
+        self._speeds.append(speed)
+        times = np.array(self._times)
+        if times.size >= _FEWEST_SPEEDS and np.ptp(times) >= _LEAST_TIME:
+            self._slope, self._start = np.polyfit(times, np.log(self._speeds), 1).tolist()
+
+    def speed(self, time: float) -> float:
+        """Root mean square of a component, [m/s]; 0 where no swing is known that ceases."""
+        if not self._slope < 0.0:
+            return 0.0
+        return math.exp(self._start + self._slope * time)
 
 
 def polynomial_terms(times: NDArray[np.float64], degree: int) -> NDArray[np.float64]:

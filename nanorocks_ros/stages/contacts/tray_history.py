@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.contacts.oscillation_fit import (
+    SwingDecay,
     fit_slope,
     oscillation_terms,
     polynomial_terms,
+    swing_speed,
 )
 
 if TYPE_CHECKING:
@@ -35,8 +37,47 @@ _MAX_RESIDUAL_NOISE = 3.0
 # displacements were registered up to a tenth too small or too large.
 _CORRELATION_FACTOR = 2.0
 _SCALE_ERROR = 0.08
+# Frames from one look at the swing of the tray to the next.
+_SWING_FRAMES = 10
 # Frames on each side over which the temperature is averaged.
 _TEMPERATURE_FRAMES = 15
+
+
+class _Fits:
+    """A line and an oscillation through the displacements of some frames.
+
+    Parameters
+    ----------
+    times : ndarray (frames,), [s]
+        From the time of which the velocity is wanted.
+    displacements : ndarray (frames, 2), [m]
+
+    Attributes
+    ----------
+    noise : float, [m]
+        Of a component, from frame to frame.
+    residual : float, [m]
+        Root mean square of a component that the oscillation leaves.
+    swings : bool
+        Whether the oscillation is seen beside the line.
+    is_smooth : bool
+        Whether the oscillation leaves little.
+    swing : float, [m/s]
+        Root mean square of a component of the velocity of the oscillation.
+    """
+
+    def __init__(self, times: NDArray[np.float64], displacements: NDArray[np.float64]) -> None:
+        differences = np.diff(displacements, 4, axis=0)
+        self.noise = float(np.sqrt(np.mean(differences**2) / _FOURTH_DIFFERENCE_VARIANCE))
+        self.line = fit_slope(polynomial_terms(times, 1), displacements)
+        terms = oscillation_terms(times, displacements)
+        self.oscillation = fit_slope(terms, displacements)
+        rest = self.oscillation.residual
+        self.residual = math.sqrt(rest / (2 * times.size))
+        self.swings = self.line.residual - rest >= _MIN_OSCILLATION_GAIN * self.noise**2
+        noise_limit = 2 * times.size * (_MAX_RESIDUAL_NOISE * self.noise) ** 2
+        self.is_smooth = rest < max(_MAX_RESIDUAL_SHARE * self.line.residual, noise_limit)
+        self.swing = swing_speed(times, self.oscillation.fitted)
 
 
 class TrayHistory:
@@ -57,6 +98,8 @@ class TrayHistory:
         # For each species: sum of the squares of the known velocities, and their number.
         self._square_buffer = np.empty((2 * frames, 0, 2))
         self._end = 0
+        self._swing = SwingDecay()
+        self._until_swing = _SWING_FRAMES
         self.interval = math.inf
 
     @property
@@ -87,6 +130,21 @@ class TrayHistory:
         times = self._time_buffer[first : self._end]
         squares = self._square_buffer[end]
         self.interval = _frame_statistics(times, tracks.velocities, tracks.species, squares)
+        self._until_swing -= 1
+        if not self._until_swing:
+            self._until_swing = _SWING_FRAMES
+            self._watch_swing()
+
+    def _watch_swing(self) -> None:
+        """Remember how fast the tray swings in the last frames, where it does."""
+        frames = 2 * _WIDE_FRAMES
+        times, displacements = self._times[-frames:], self._displacements[-frames:]
+        if times.size < frames:
+            return
+        middle = 0.5 * float(times[0] + times[-1])
+        fits = _Fits(times - middle, displacements)
+        if fits.swings and fits.is_smooth:
+            self._swing.push(middle, fits.swing)
 
     def _window(self, time: float, frames: int) -> slice:
         middle = int(np.searchsorted(self._times, time))
@@ -105,26 +163,20 @@ class TrayHistory:
         displacements = self._displacements
         if times[wide].size < _MIN_FRAMES:
             return np.zeros(2), math.inf
-        differences = np.diff(displacements[wide], 4, axis=0)
-        noise = float(np.sqrt(np.mean(differences**2) / _FOURTH_DIFFERENCE_VARIANCE))
-        line = fit_slope(polynomial_terms(times[wide], 1), displacements[wide])
-        oscillation = fit_slope(
-            oscillation_terms(times[wide], displacements[wide]), displacements[wide]
-        )
-        if line.residual - oscillation.residual < _MIN_OSCILLATION_GAIN * noise**2:
+        fits = _Fits(times[wide], displacements[wide])
+        swing = self._swing.speed(time)
+        if not fits.swings:
             # An oscillation below the noise may still be there.
-            return line.velocity, noise * math.hypot(
-                line.error_factor, 0.5 * oscillation.error_factor
-            )
-        noise_limit = 2 * times[wide].size * (_MAX_RESIDUAL_NOISE * noise) ** 2
-        if oscillation.residual < max(_MAX_RESIDUAL_SHARE * line.residual, noise_limit):
-            residual_rms = math.sqrt(oscillation.residual / (2 * times[wide].size))
-            error = _CORRELATION_FACTOR * max(noise, residual_rms) * oscillation.error_factor
-            return oscillation.velocity, math.hypot(
-                error, _SCALE_ERROR * math.hypot(*oscillation.velocity)
-            )
+            factor = math.hypot(fits.line.error_factor, 0.5 * fits.oscillation.error_factor)
+            return fits.line.velocity, math.hypot(fits.noise * factor, swing)
+        if fits.is_smooth:
+            velocity = fits.oscillation.velocity
+            error = _CORRELATION_FACTOR * max(fits.noise, fits.residual)
+            error *= fits.oscillation.error_factor
+            unseen = max(swing - fits.swing, 0.0)
+            return velocity, math.hypot(error, _SCALE_ERROR * math.hypot(*velocity), unseen)
         cubic = fit_slope(polynomial_terms(times[narrow], 3), displacements[narrow])
-        return cubic.velocity, _CORRELATION_FACTOR * noise * cubic.error_factor
+        return cubic.velocity, _CORRELATION_FACTOR * fits.noise * cubic.error_factor
 
     def displacement(self, time: float) -> tuple[float, float]:
         """Displacement of the tray at a time, [m], with the noise of its registration."""

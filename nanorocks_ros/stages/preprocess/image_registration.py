@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _ITERATIONS = 12
 _CONVERGED_PX = 0.005
+# Before the light is fitted its change would count as noise of every point.
+_CONVERGED_LEVELS = 0.3
 # A difference of more than so many standard deviations counts as this many.
 _BOUND = 2.0
 # Median of the absolute value of a normal variate.
@@ -162,6 +164,7 @@ def register(
     dx, dy, gain, offset = start[0], start[1], 1.0, 0.0
     raw, differences = np.empty(n), np.empty(n)
     middle = reference.mean()
+    contrast = math.sqrt(((reference - middle) ** 2).mean())
     row, step = np.empty(UNKNOWNS), np.empty((UNKNOWNS, 1))
     normal = np.empty((UNKNOWNS, UNKNOWNS))
     spread, change = 0.0, 0.0
@@ -188,13 +191,12 @@ def register(
         gain += step[2, 0]
         offset += step[3, 0]
         change = math.sqrt(step[0, 0] * step[0, 0] + step[1, 0] * step[1, 0])
-        if change < _CONVERGED_PX:
+        light = abs(step[3, 0]) + abs(step[2, 0]) * contrast
+        if change < _CONVERGED_PX and light < _CONVERGED_LEVELS:
             break
     sample(image, mix, places, (dx, dy), raw)
-    total = 0.0
     for k in range(n):
         values[k] = (raw[k] - offset - middle) / max(gain, 0.1) + middle
-        total += (reference[k] - middle) * (reference[k] - middle)
     result[0], result[1] = dx, dy
     # The factor of Cholesky is left in `normal`: errors of the first two unknowns.
     sides = np.zeros((UNKNOWNS, 2))
@@ -203,7 +205,7 @@ def register(
     result[2] = spread * math.sqrt(0.5 * (sides[0, 0] + sides[1, 1])) + 0.5 * change
     result[3] = spread
     # At a wrong displacement the light seems to have lost its contrast: the gain is small.
-    result[4] = max(gain, 0.0) * math.sqrt(total / n)
+    result[4] = max(gain, 0.0) * contrast
     return True
 
 

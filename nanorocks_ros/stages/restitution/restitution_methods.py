@@ -245,7 +245,7 @@ class DecayLibraryMethod:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         flights = contacts.flights
         losses = flight_losses(flights, self._drag_prior)
-        terms = contacts.terms(losses.drag.value)
+        terms = contacts.terms(losses.slowing.drag.value)
         friction = friction_weights(self._prior, terms)
         highest = math.inf if final else friction.highest if friction else 0.0
         likelihood = self._likelihood(decay, losses, highest)
@@ -290,7 +290,7 @@ class DecayLibraryMethod:
             known.speed,
             known.error,
             self._camera[known.of_grains],
-            self._drag_of_gas(losses.drag),
+            self._drag_of_gas(losses.slowing.drag),
             highest,
         )
         return likelihood.emptied() if decay is None else likelihood

@@ -21,6 +21,7 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.speed.jumping_tracks import JumpingTracks
+from nanorocks_ros.stages.speed.skipped_frames import SkippedFrames
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (
     CUT_LOSS_BIAS,
@@ -83,6 +84,7 @@ class TrackSpeed:
         self.reliability = TrackReliability(self._tray, crowded=self._crowded)
         self._recent = TrackWindow()
         self._jumps = JumpingTracks(self._pixels_per_metre) if self._flagged_path else None
+        self._skipped = SkippedFrames(self._pixels_per_metre)
         self._next_ns: int | None = None
         self._last_ns: int | None = None
         self._flags = Quality(0)
@@ -103,6 +105,7 @@ class TrackSpeed:
         # The tracker knows whether tray and camera can be told apart.
         self._flags |= record.quality & Quality.STABILISATION_LOST
         unbroken = self._jumps.cut(record) if self._jumps else record
+        self._skipped.push(unbroken)
         self._recent.push(unbroken, record.stamp_ns - _LONGEST_WINDOW_NS)
         self.reliability.push(record)
         if self._next_ns is not None and record.stamp_ns < self._next_ns:
@@ -162,6 +165,8 @@ class TrackSpeed:
             np.diff(series.stamps),
         )
         flags, self._flags = self._flags, Quality(0)
+        if self._skipped.matters:
+            flags |= Quality.SKIPPED_FRAMES
         if mean.share < self.reliability.lowest_share or mean.hidden > _MOST_HIDDEN:
             flags |= Quality.FEW_BEADS
         path = 0.5 * mean.window * mean.mean_projected_speed

@@ -9,7 +9,6 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment import paper_values as reported
-from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.speed_dependence import speed_dependence
 from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import (
@@ -123,7 +122,7 @@ def impact_figure(path: Path, data: ImpactData) -> dict[str, Any]:
 def _panels(data: ImpactData) -> tuple[_Panel, _Panel]:
     terms, prior = data.terms, data.prior
     rubbed = walls_rub(terms.wall_friction)
-    slowing = data.losses.rubbed if rubbed else Slowing.by_drag(data.losses.drag)
+    slowing = data.losses.rubbed if rubbed else data.losses.slowing
     dependence = speed_dependence(terms, data.losses, prior)
     beads = terms.bead_likelihood(prior.collision_bias, slowing)
     walls = terms.wall_likelihood(prior.rebound_bias, slowing)

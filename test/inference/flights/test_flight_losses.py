@@ -97,6 +97,15 @@ def test_few_flights_leave_the_prior_and_none_the_drag_as_given():
     assert flight_losses(flight_table(()), Measured(0.01, 0.2)).drag == Measured(0.01, 0.0)
 
 
+def test_a_gas_does_not_speed_beads_up_between_contacts():
+    losses = flight_losses(flight_table(bent_flights(200, -0.02)), WIDE)
+    assert losses.drag.value == pytest.approx(-0.02, abs=3.0 * losses.drag.error)
+    assert losses.slowing.drag.value == 0.0
+    assert losses.slowing.drag.error == pytest.approx(losses.drag.error)
+    positive = flight_losses(flight_table(bent_flights(200, 0.02)), WIDE)
+    assert positive.slowing.drag == positive.drag
+
+
 def test_an_acceleration_is_seen_and_bounded():
     still = flight_losses(flight_table(bent_flights(200, 0.0)), WIDE)
     assert not still.is_accelerated

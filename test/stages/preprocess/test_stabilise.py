@@ -70,6 +70,17 @@ def test_light_that_changes_is_no_motion(plate):
     assert max(abs(shift.x), abs(shift.y)) < 0.05
 
 
+def test_a_tray_at_rest_is_registered_as_well_in_half_of_the_light(plate):
+    tracker = follower(plate)
+    picture = plate.picture(seed=1)
+    tracker.push(picture, None)
+    same = tracker.push(picture, None)
+    darker = tracker.push((0.5 * picture).round().astype(np.uint8), None)
+    assert darker is not None
+    assert max(abs(darker.x), abs(darker.y)) < 0.02
+    assert darker.error < 1.5 * same.error
+
+
 def test_a_jump_of_many_pixels_between_two_frames_is_found(plate):
     tracker = follower(plate)
     tracker.push(plate.picture(seed=1), None)
