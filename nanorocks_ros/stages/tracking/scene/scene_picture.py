@@ -144,7 +144,8 @@ def scene_colours(
     changed = mixed - background.astype(np.float32) @ weights.astype(np.float32)
     unrest = max(colours.noise, float(np.median(np.abs(changed))) / 0.6745)
     changed -= cv2.blur(changed, (_WIDE_PX, _WIDE_PX))
-    noise = max(colours.noise, float(np.median(np.abs(changed))) / 0.6745)
+    # Beads reach as far in this difference, and may make it the larger one.
+    noise = max(colours.noise, min(unrest, float(np.median(np.abs(changed))) / 0.6745))
     return replace(colours, noise=noise, unrest=unrest, knows_background=True)
 
 
