@@ -155,7 +155,9 @@ def ring_medians(
             for i in range(count):
                 x = np.rint(discs[k, 0] + discs[k, 2] * places[i, 0])
                 y = np.rint(discs[k, 1] + discs[k, 2] * places[i, 1])
-                column, row = int(min(max(x, 0.0), columns)), int(min(max(y, 0.0), rows))
+                # NaN counts as 0.
+                column = int(min(x, columns)) if x > 0.0 else 0
+                row = int(min(y, rows)) if y > 0.0 else 0
                 _insert(values, i, color[row, column, channel])
             upper, lower = float(values[count // 2]), float(values[(count - 1) // 2])
             medians[k, channel] = 0.5 * (upper + lower)

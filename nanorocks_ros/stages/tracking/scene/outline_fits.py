@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # Part of the radius on either side of the outline that is searched for edges, by iteration.
 _REACHES = 0.5, 0.25
+# Fewer rows or columns have no outline, and nothing is farther away.
+_LEAST_PX, _FARTHEST_PX = 2, 1e6
 # Smallest step of an edge over the usual one, and over the noise.
 _LEAST_STEP, _LEAST_NOISES = 0.25, 3.0
 # A disc is smeared by at most this part of its radius to either side.
@@ -110,7 +112,13 @@ def _fitted(
         float(voting.largest),
         np.ascontiguousarray(shape[:, :terms]),
     )
-    results = np.empty((len(discs), RESULTS))
-    picture, discs = np.ascontiguousarray(picture), np.ascontiguousarray(discs)
-    fit_each(picture, discs, search, _REACHES, scratch(terms), results)
+    results = np.zeros((len(discs), RESULTS))
+    results[:, :3] = discs
+    # Compiled functions do not check their indices.
+    somewhere = (np.abs(discs) < _FARTHEST_PX).all(axis=1)
+    if min(picture.shape) >= _LEAST_PX and somewhere.any():
+        starts, fitted = discs[somewhere], results[somewhere]
+        picture = np.ascontiguousarray(picture)
+        fit_each(picture, starts, search, _REACHES, scratch(terms), fitted)
+        results[somewhere] = fitted
     return results

@@ -180,9 +180,9 @@ def _steepest(rises: NDArray[np.float64], count: int, half: int, pitch: float) -
 @inlined
 def _value(picture: NDArray[np.uint8], x: float, y: float) -> float:
     """The picture between its pixels; beyond its border as on it."""
-    x = min(max(x, 0.0), picture.shape[1] - 1.001)
-    y = min(max(y, 0.0), picture.shape[0] - 1.001)
-    # Not below 0: numba need not ask whether to count from the end.
+    # Never below 0, so that numba need not count from the end; NaN counts as 0.
+    x = min(x, picture.shape[1] - 1.001) if x > 0.0 else 0.0
+    y = min(y, picture.shape[0] - 1.001) if y > 0.0 else 0.0
     column, row = np.uint64(x), np.uint64(y)
     next_column, next_row = column + np.uint64(1), row + np.uint64(1)
     right, below = x - np.float64(column), y - np.float64(row)

@@ -41,8 +41,8 @@ _LEAST_VOTES, _LEAST_SUPPORT = 0.25, 0.5
 _GOOD_SUPPORT = 0.7
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
-# More frames are searched where fewer discs move.
-_FEW_MOVING = 8
+# So many frames are searched where fewer discs move.
+_FEW_MOVING, _MORE_FRAMES = 8, 25
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
 # Circles inside and outside a disc, in radii; and how much more contrast the background has where
@@ -101,7 +101,7 @@ class SceneModel:
         self._learn(_some(frames, _LEARNING_FRAMES))
         if self.colours.knows_background and len(self._moved) < _FEW_MOVING:
             # Of a single bead each frame shows but one.
-            self._learn_looks(frames)
+            self._learn_looks(_some(frames, _MORE_FRAMES))
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
             large = [self._enlarged(frame) for frame in frames]

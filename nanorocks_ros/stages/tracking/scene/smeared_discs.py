@@ -47,7 +47,8 @@ def smeared_discs(
     starts = starts[marked_shares(moving, starts) >= _LEAST_MOVING]
     scale = min(1.0, _RADIUS_PX / math.sqrt(voting.smallest * voting.largest))
     if scale < 1.0 and len(starts):
-        size = round(picture.shape[1] * scale), round(picture.shape[0] * scale)
+        rows, columns = picture.shape
+        size = max(1, round(columns * scale)), max(1, round(rows * scale))
         picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
     voting = voting._replace(smallest=voting.smallest * scale, largest=voting.largest * scale)
     starts = np.column_stack([(starts[:, :2] + 0.5) * scale - 0.5, starts[:, 2] * scale])

@@ -48,3 +48,10 @@ def test_the_colour_of_a_circle_is_the_median_of_its_pixels():
 
 def test_no_disc_has_no_colour():
     assert ring_colours(np.zeros((5, 5, 3), np.uint8), np.empty((0, 3)), (0.5,)).shape == (0, 3)
+
+
+def test_the_colour_of_a_disc_that_is_nowhere_is_that_of_a_corner():
+    color = np.zeros((4, 5, 3), np.uint8)
+    color[0, 0] = 9
+    nowhere = np.array([[np.nan, np.nan, 3.0]])
+    assert ring_colours(color, nowhere, (0.5,)).tolist() == [[9.0, 9.0, 9.0]]
