@@ -51,9 +51,13 @@ class RoamedRegion:
     colours: SceneColours
     levels: float
 
+    def outside(self, discs: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which discs (n, 3) lie outside."""
+        return np.asarray(marked_shares(self.mask, discs) < _ROAMED_SHARE)
+
     def aside(self, color: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which discs (n, 3) lie outside, and do not move in a frame either."""
-        aside = marked_shares(self.mask, discs) < _ROAMED_SHARE
+        aside = self.outside(discs)
         if aside.any():
             moving = self.colours.moving(color, self.levels)
             aside[aside] = marked_shares(moving, discs[aside]) < MOVING_SHARE

@@ -42,7 +42,7 @@ _GOOD_SUPPORT = 0.7
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
 # So many frames are searched where fewer discs move.
-_FEW_MOVING, _MORE_FRAMES = 8, 25
+_FEW_MOVING, _MORE_FRAMES = 8, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
 # Circles inside and outside a disc, in radii; and how much more contrast the background has where
@@ -105,7 +105,10 @@ class SceneModel:
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
             large = [self._enlarged(frame) for frame in frames]
-            self._roamed = roamed_region(large, self.colours, moved, self.views[-1].voting.step)
+            region = roamed_region(large, self.colours, moved, self.views[-1].voting.step)
+            # A bed of beads at rest is no clutter.
+            if region.outside(self._rested * self.scale).sum() < len(moved):
+                self._roamed = region
 
     @property
     def radii(self) -> tuple[float, float]:
@@ -239,6 +242,7 @@ class SceneModel:
         self._moved = every.outlines.discs[moving]
         known = moving if self.sees_motion else good
         self._known = KnownBeads.of(every.colours[known], every.outlines.discs[known, 2])
+        self._rested = every.outlines.discs[self.alike(every) & good & ~moving]
 
     def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
         """The picture, for bright discs, dark ones, or both where both occur.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Radius to which the picture is reduced, [px]: soft edges get sharper by it.
 _RADIUS_PX = 10.0
 # Smallest share of the rays with an edge on the outline, and of the disc that moves.
-_LEAST_SUPPORT, _LEAST_MOVING = 0.6, 0.6
+_LEAST_SUPPORT, _LEAST_MOVING = 0.7, 0.6
 # Trust in a smeared outline over that of a sharp one.
 _TRUST = 0.6
 
