@@ -26,7 +26,7 @@ def smeared(radius, smear, turn=0.7, size=(240, 300)):
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8), (cover > 0.1).astype(np.uint8)
 
 
-@pytest.mark.parametrize(('radius', 'smear'), [(12.0, 9.0), (40.0, 25.0), (40.0, 36.0)])
+@pytest.mark.parametrize(('radius', 'smear'), [(12.0, 9.0), (40.0, 20.0), (40.0, 32.0)])
 def test_a_smeared_bead_is_found_in_the_middle_of_its_way(radius, smear):
     picture, moving = smeared(radius, smear)
     voting = Voting(radius / 1.2, radius * 1.2, -1, 70.0, 2.0)
@@ -40,7 +40,7 @@ def test_a_smeared_bead_is_found_in_the_middle_of_its_way(radius, smear):
 
 
 def test_a_circle_alone_loses_a_smeared_bead():
-    picture, moving = smeared(40.0, 36.0)
+    picture, moving = smeared(40.0, 30.0)
     voting = Voting(33.0, 48.0, -1, 70.0, 2.0)
     start = np.array([[*PLACE, 40.0]])
     assert fit_outlines(picture, start, voting).support[0] < 0.5
