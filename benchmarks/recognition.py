@@ -20,7 +20,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from benchmarks.drawn_scenes import SCENES, draw
-from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, scene_model
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.stages.tracking.scene.scene_model import scene_model
 
 # A disc is right within this part of the radius of a bead.
 _RIGHT = 0.3

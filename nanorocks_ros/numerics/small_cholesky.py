@@ -1,4 +1,4 @@
-"""Cholesky factors of small symmetric matrices, compiled.
+"""Cholesky factors and equations of small symmetric matrices, compiled.
 
 For a few rows the overhead of a LAPACK call exceeds the work.
 """
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import compiled, kernel
+from nanorocks_ros.numerics.compiled import compiled, inlined, kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,6 +66,29 @@ def whiten(factor: NDArray[np.float64], columns: NDArray[np.float64], count: int
                 a -= row[k] * column[k]
                 b -= row[k] * next_column[k]
             column[i], next_column[i] = a * row[i], b * row[i]
+
+
+@inlined
+def eliminate(matrix: NDArray[np.float64], solution: NDArray[np.float64]) -> None:
+    """Replace the right side of equations by their solution, within a kernel.
+
+    Parameters
+    ----------
+    matrix : ndarray (n, n)
+        Symmetric and positive definite: no row is exchanged. Overwritten.
+    solution : ndarray (n,)
+    """
+    count = len(solution)
+    for k in range(count):
+        for i in range(k + 1, count):
+            factor = matrix[i, k] / matrix[k, k]
+            for j in range(k, count):
+                matrix[i, j] -= factor * matrix[k, j]
+            solution[i] -= factor * solution[k]
+    for k in range(count - 1, -1, -1):
+        for i in range(k + 1, count):
+            solution[k] -= matrix[k, i] * solution[i]
+        solution[k] /= matrix[k, k]
 
 
 @compiled

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_triangular
 
-from nanorocks_ros.numerics.small_cholesky import factorise, whiten
+from nanorocks_ros.numerics.compiled import kernel
+from nanorocks_ros.numerics.small_cholesky import eliminate, factorise, whiten
 
 
 @pytest.mark.parametrize('size', [1, 2, 3, 24, 25])
@@ -27,3 +28,18 @@ def test_columns_are_whitened_by_the_cholesky_factor(size, scale):
         solved = solve_triangular(expected, columns[:count].T, lower=True).T
         np.testing.assert_allclose(whitened[:count], solved, rtol=1e-8)
         np.testing.assert_array_equal(whitened[count:], columns[count:])
+
+
+@kernel
+def solve(matrix, solution):
+    eliminate(matrix, solution)
+
+
+@pytest.mark.parametrize('size', [1, 3, 5])
+def test_equations_within_a_kernel_have_the_solution_of_lapack(size):
+    rng = np.random.default_rng(size)
+    half = rng.normal(size=(size, size))
+    matrix, right = half @ half.T + np.eye(size), rng.normal(size=size)
+    solution = right.copy()
+    solve(matrix.copy(), solution)
+    assert solution == pytest.approx(np.linalg.solve(matrix, right), rel=1e-9)

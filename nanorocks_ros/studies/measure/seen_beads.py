@@ -11,8 +11,9 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
-from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, SceneModel
+from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,12 +12,17 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nanorocks_ros.stages.tracking.scene.disc_kernels import leave_out_near, ring_medians
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+
+
+# A disc stays where another one lies within this part of its radius in so many other frames.
+_STAYS_SHARE, _STAYS_FRAMES = 0.25, 3
 
 
 def join_outlines(parts: Sequence[Outlines]) -> Outlines:
@@ -43,17 +48,10 @@ def apart(outlines: Outlines, radii: float = 1.0) -> NDArray[np.bool_]:
     radii : float, optional
         Smallest distance of two centres, in radii.
     """
-    discs = outlines.discs
+    discs = np.ascontiguousarray(outlines.discs)
     order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
-    keep = np.zeros(len(discs), dtype=bool)
-    if len(discs) == 0:
-        return keep
-    pairs = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], radii * discs[:, 2])
-    taken = np.zeros(len(discs), dtype=bool)
-    for k in order:
-        if not taken[k]:
-            keep[k] = True
-            taken[pairs[k]] = True
+    keep = np.ones(len(discs), dtype=bool)
+    leave_out_near(discs, order, radii, keep)
     return keep
 
 
@@ -62,17 +60,18 @@ def ring_colours(
 ) -> NDArray[np.float64]:
     """Median colour of the circles around each centre of these parts of the radius, (n, 3)."""
     turns = np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False)
-    across = np.outer(parts, np.cos(turns)).ravel()
-    down = np.outer(parts, np.sin(turns)).ravel()
-    columns = np.clip(np.rint(discs[:, :1] + discs[:, 2:] * across), 0, color.shape[1] - 1)
-    rows = np.clip(np.rint(discs[:, 1:2] + discs[:, 2:] * down), 0, color.shape[0] - 1)
-    values = color[rows.astype(np.intp), columns.astype(np.intp)]
-    return np.asarray(np.median(values, axis=1), dtype=np.float64).reshape(len(discs), 3)
+    places = np.stack(
+        [np.outer(parts, np.cos(turns)).ravel(), np.outer(parts, np.sin(turns)).ravel()], axis=1
+    )
+    medians = np.empty((len(discs), 3))
+    values = np.empty(len(places), dtype=np.uint8)
+    ring_medians(np.ascontiguousarray(color), np.ascontiguousarray(discs), places, values, medians)
+    return medians
 
 
 def marked_shares(mask: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArray[np.float64]:
     """Share of the bounding square of each disc in which the mask is 1."""
-    sums = cv2.integral(mask).astype(np.float64)
+    sums = cv2.integral(mask)
     low = np.floor(discs[:, :2] - discs[:, 2:]).astype(np.intp)
     high = np.ceil(discs[:, :2] + discs[:, 2:]).astype(np.intp) + 1
     limits = np.array([mask.shape[1], mask.shape[0]])
@@ -84,3 +83,25 @@ def marked_shares(mask: NDArray[np.uint8], discs: NDArray[np.float64]) -> NDArra
         + sums[low[:, 1], low[:, 0]]
     )
     return np.asarray(inside / np.maximum((high - low).prod(axis=1), 1))
+
+
+def staying(
+    discs: NDArray[np.float64], moving: NDArray[np.bool_], frames: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Which discs lie where others do in several frames, or where one is at rest in another.
+
+    The light, and what it makes of the difference from the background, may change.
+
+    Parameters
+    ----------
+    discs : ndarray (n, 3)
+    moving : ndarray of bool, (n,)
+    frames : ndarray of int, (n,)
+        Number of the frame of each.
+    """
+    stays = np.zeros(len(discs), dtype=bool)
+    places = cKDTree(discs[:, :2]).query_ball_point(discs[:, :2], _STAYS_SHARE * discs[:, 2])
+    for k, near in enumerate(places):
+        others = np.array([j for j in near if frames[j] != frames[k]], dtype=np.intp)
+        stays[k] = len(np.unique(frames[others])) >= _STAYS_FRAMES or not moving[others].all()
+    return stays

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
+from nanorocks_ros.stages.tracking.scene.disc_kernels import add_votes, find_peaks
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -97,29 +99,21 @@ def _votes(picture: NDArray[np.uint8], scale: float, voting: Voting) -> NDArray[
     middle = math.sqrt(low * high)
     blur = min(max(_BLUR_SHARE * middle, _BLUR_PX[0]), _BLUR_PX[1])
     smooth = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), blur)
-    across = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125)
-    down = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
-    size = cv2.magnitude(across, down)
+    across = np.asarray(cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125), dtype=np.float32)
+    down = np.asarray(cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125), dtype=np.float32)
+    size = np.asarray(cv2.magnitude(across, down), dtype=np.float32)
     # Noise of the gradient of a blurred picture; a reduced one has less.
     noise = voting.noise * scale * 0.28 / max(blur, 0.5) ** 2
     cap = voting.step / (2.5 * math.hypot(blur, 0.7))
-    rows, columns = np.nonzero(size > max(_NOISE_FACTOR * noise, 0.2 * cap))
-    sizes = size[rows, columns]
-    right, below = across[rows, columns] / sizes, down[rows, columns] / sizes
-    weights = np.minimum(sizes, cap) / voting.step
-    left, top = columns.astype(np.float32), rows.astype(np.float32)
-    votes = np.zeros(picture.size, dtype=np.float64)
-    radii = np.linspace(low, high, max(1, math.ceil(high - low) + 1))
-    for sign in (1, -1) if voting.sign == 0 else (voting.sign,):
-        for radius in radii:
-            # The gradient points to the brighter side.
-            x = np.rint(left + np.float32(sign * radius) * right).astype(np.int32)
-            y = np.rint(top + np.float32(sign * radius) * below).astype(np.int32)
-            inside = (x >= 0) & (x < picture.shape[1]) & (y >= 0) & (y < picture.shape[0])
-            places = y[inside] * picture.shape[1] + x[inside]
-            votes += np.bincount(places, weights[inside], minlength=picture.size)
+    radii = np.linspace(low, high, max(1, math.ceil(high - low) + 1)).astype(np.float32)
+    signs = (1, -1) if voting.sign == 0 else (voting.sign,)
+    votes = np.zeros(picture.shape, dtype=np.float32)
+    least = np.float32(max(_NOISE_FACTOR * noise, 0.2 * cap))
+    limits = least, np.float32(cap), np.float32(1.0 / voting.step)
+    for sign in signs:
+        add_votes(across, down, size, np.float32(sign) * radii, limits, votes)
     spread = max(_SPREAD_PX, _SPREAD_SHARE * middle)
-    collected = cv2.GaussianBlur(votes.reshape(picture.shape).astype(np.float32), (0, 0), spread)
+    collected = cv2.GaussianBlur(votes, (0, 0), spread)
     # The sum of the votes within the spread, over the number of pixels of an outline.
     factor = 4.0 * math.pi * spread**2 / (2.0 * math.pi * middle)
     return np.asarray(collected * factor, dtype=np.float32)
@@ -129,7 +123,9 @@ def _peaks(votes: NDArray[np.float32], apart: float, least: float) -> NDArray[np
     """Column, row and votes of the largest votes within a distance, largest first."""
     reach = math.ceil(apart)
     shape = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    largest = cv2.dilate(votes, shape)
-    rows, columns = np.nonzero((votes >= largest) & (votes > least))
-    peaks = np.stack([columns, rows, votes[rows, columns]], axis=1).astype(np.float64)
-    return peaks[np.argsort(-peaks[:, 2], kind='stable')]
+    near = np.argwhere(shape) - reach
+    # The nearest ones first: most places have a neighbour with more votes.
+    near = np.ascontiguousarray(near[np.argsort((near**2).sum(axis=1), kind='stable')])
+    peaks = np.empty((votes.size // 2 + 1, 3))
+    peaks = peaks[: find_peaks(votes, near, np.float32(least), peaks)]
+    return np.asarray(peaks[np.argsort(-peaks[:, 2], kind='stable')])

@@ -21,6 +21,8 @@ ALIKE = 3.0
 _KNOWN_SHARE = 0.03
 _LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
 _MOST_SAMPLES = 400
+# Of so many known beads two are alike.
+_MANY = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,8 @@ class KnownBeads:
     ) -> NDArray[np.float64]:
         """Distance of discs with colours (n, 3) and radii (n,) to known beads, in spreads."""
         # Not the nearest: what was taken for a bead by mistake is known, too.
-        nearest = max(1, round(_KNOWN_SHARE * self.tree.n))
+        least = 2 if self.tree.n >= _MANY else 1
+        nearest = max(least, round(_KNOWN_SHARE * self.tree.n))
         features = np.column_stack([colours, np.log(radii)]) / self.spreads
         return np.asarray(self.tree.query(features, k=[nearest])[0][:, 0])
 

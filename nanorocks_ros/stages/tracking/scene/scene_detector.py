@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
-from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, SceneModel, scene_model
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel, scene_model
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,12 +138,17 @@ class SceneDetector:
         nearer = distances[:, k] <= self._colour_distances(candidates.around)[:, k]
         alike = model.alike(candidates) & nearer & (np.argmin(distances, axis=1) == k)
         alike &= self._is_allowed(outlines.discs, color.shape)
+        # Where the film is not known to its end, they may move yet.
+        aside = candidates.aside & (self._learnt_at < 0)
+        if self._tray.species[k].expected is None:
+            alike &= ~aside
         discs = _RankedDiscs(
             outlines.discs,
             np.hypot(outlines.errors, _LEAST_ERROR_PX),
             outlines.radius_errors,
             outlines.support,
-            outlines.support * np.minimum(outlines.steps, 1.0),
+            # As many as told may lie aside; of any number these are none.
+            outlines.support * np.minimum(outlines.steps, 1.0) - aside,
         ).chosen(alike)
         return discs.chosen(np.argsort(-discs.score, kind='stable'))
 

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook, Candidates, View
 from nanorocks_ros.stages.tracking.scene.disc_measures import (
     apart,
     join_outlines,
     marked_shares,
     reduced,
     ring_colours,
+    staying,
 )
 from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
 from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, KnownBeads
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
 from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
+from nanorocks_ros.stages.tracking.scene.roamed_region import (
+    MOVING_SHARE,
+    RoamedRegion,
+    roamed_region,
+)
 from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
+from nanorocks_ros.stages.tracking.scene.smeared_discs import smeared_discs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,10 +39,10 @@ if TYPE_CHECKING:
 # Smallest share of the outline that votes, and that the edges on the circle cover.
 _LEAST_VOTES, _LEAST_SUPPORT = 0.25, 0.5
 _GOOD_SUPPORT = 0.7
-# A disc moves where this share of it differs from the background.
-_MOVING_SHARE = 0.15
 # Moving discs that tell what beads look like, and their share of all discs.
-_LEAST_MOVING, _LEAST_MOVING_SHARE = 6, 0.1
+_LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
+# So many frames are searched where fewer discs move.
+_FEW_MOVING, _MORE_FRAMES = 8, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
 # Circles inside and outside a disc, in radii; and how much more contrast the background has where
@@ -49,63 +58,14 @@ _LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
 # Distance to a known bead up to which a moving disc looks alike, in spreads.
 _ALIKE_MOVING = 6.0
 # Beads below this radius are enlarged, [px].
-_LEAST_RADIUS_PX = 4.5
+_LEAST_RADIUS_PX = 6.5
 # Discs of the other brightness count when they are at least this part.
 _OTHER_SIGN_SHARE = 0.4
 _LEAST_CONTRAST = 6.0
+# A search begins where a bead is expected, and not again within this part of its radius.
+_SAME_SHARE = 0.2
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BeadLook:
-    """What is told of the beads of a species.
-
-    Parameters
-    ----------
-    radii : tuple of 2 floats, [px]
-        Smallest and largest; NaN: not known.
-    sign : int
-        1: brighter than the floor, -1: darker, 0: not known.
-    colour : tuple of 3 floats or None, bgr, [gray levels]
-    apart : float
-        Smallest distance of two beads in the picture, in radii.
-    """
-
-    radii: tuple[float, float] = (math.nan, math.nan)
-    sign: int = 0
-    colour: tuple[float, float, float] | None = None
-    apart: float = 1.25
-
-
-class Candidates(NamedTuple):
-    """Discs in a frame: outlines, colours inside and around (n, 3), share of each that moves."""
-
-    outlines: Outlines
-    colours: NDArray[np.float64]
-    around: NDArray[np.float64]
-    moving: NDArray[np.float64]
-
-
-class View(NamedTuple):
-    """A picture in which discs are searched.
-
-    Parameters
-    ----------
-    moves : bool
-        Whether it is the difference from the background.
-    voting : Voting
-    evidence : float
-        Sum over the discs that were learnt from.
-    """
-
-    moves: bool
-    voting: Voting
-    evidence: float
-
-    def of(self, color: NDArray[np.uint8], colours: SceneColours) -> NDArray[np.uint8]:
-        """The picture, (rows, columns)."""
-        return colours.difference(color) if self.moves else colours.picture(color)
 
 
 class SceneModel:
@@ -137,8 +97,18 @@ class SceneModel:
         self.colours: SceneColours = scene_colours(frames, colour).enlarged(self.scale)
         self.sees_motion = False
         self._known: KnownBeads | None = None
-        chosen = np.linspace(0, len(frames) - 1, min(_LEARNING_FRAMES, len(frames)))
-        self._learn([frames[round(k)] for k in chosen])
+        self._roamed: RoamedRegion | None = None
+        self._learn(_some(frames, _LEARNING_FRAMES))
+        if self.colours.knows_background and len(self._moved) < _FEW_MOVING:
+            # Of a single bead each frame shows but one.
+            self._learn_looks(_some(frames, _MORE_FRAMES))
+        if self.colours.knows_background and self.sees_motion:
+            moved = self._moved * self.scale
+            large = [self._enlarged(frame) for frame in frames]
+            region = roamed_region(large, self.colours, moved, self.views[-1].voting.step)
+            # A bed of beads at rest is no clutter.
+            if region.outside(self._rested * self.scale).sum() < len(moved):
+                self._roamed = region
 
     @property
     def radii(self) -> tuple[float, float]:
@@ -161,7 +131,8 @@ class SceneModel:
             half = 0.5 * (self.scale - 1.0)
             hints = hints * self.scale + np.array([half, half, 0.0])
         color = self._enlarged(color)
-        rows = [self._outlines(color, view, hints) for view in self.views]
+        moving = self.colours.moving(color)
+        rows = [self._outlines(color, view, hints, moving) for view in self.views]
         # In the difference a shadow is part of its bead.
         trust = [_DIFFERENCE_TRUST if view.moves else 1.0 for view in self.views]
         outlines = join_outlines(
@@ -172,8 +143,11 @@ class SceneModel:
             outlines = outlines.chosen(~self._left(color, outlines))
         colours = ring_colours(color, outlines.discs, _INSIDE)
         around = ring_colours(color, outlines.discs, _OUTSIDE)
-        moving = marked_shares(self.colours.moving(color), outlines.discs)
-        return Candidates(reduced(outlines, self.scale), colours, around, moving)
+        moves = marked_shares(moving, outlines.discs)
+        aside = np.zeros(len(moves), dtype=bool)
+        if self._roamed is not None:
+            aside = self._roamed.aside(color, outlines.discs)
+        return Candidates(reduced(outlines, self.scale), colours, around, moves, aside)
 
     def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         if self.scale == 1:
@@ -208,23 +182,33 @@ class SceneModel:
             return np.asarray(told)
         radii = candidates.outlines.discs[:, 2]
         distances = self._known.distances(candidates.colours, radii)
-        rest = candidates.moving < _MOVING_SHARE
+        rest = candidates.moving < MOVING_SHARE
         near = distances < np.where(rest, ALIKE, _ALIKE_MOVING)
         return np.asarray(told & self._known.have_size(radii) & near)
 
     def _outlines(
-        self, color: NDArray[np.uint8], view: View, hints: NDArray[np.float64] | None = None
+        self,
+        color: NDArray[np.uint8],
+        view: View,
+        hints: NDArray[np.float64] | None = None,
+        moving: NDArray[np.uint8] | None = None,
     ) -> Outlines:
-        """Discs that show in a view; their steps over the usual one."""
+        """Discs that show in a view, smeared ones where it moves; their steps over the usual."""
         picture = view.of(color, self.colours)
         starts = centres_of_all_sizes(picture, view.voting, _LEAST_VOTES)[:, :3]
         if hints is not None and len(hints):
-            starts = np.concatenate([starts, hints])
+            apart_from_hints = cKDTree(hints[:, :2]).query(starts[:, :2])[0]
+            elsewhere = apart_from_hints > _SAME_SHARE * view.voting.smallest
+            starts = np.concatenate([starts[elsewhere], hints])
         outlines = fit_outlines(picture, starts, view.voting)
         steps = outlines.steps / view.voting.step
         good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
-        good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * self.colours.noise)
-        return outlines._replace(steps=steps).chosen(good)
+        good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * view.voting.noise)
+        sharp = outlines._replace(steps=steps).chosen(good)
+        if moving is None or self._known is None or not self.colours.knows_background:
+            return sharp
+        smeared = smeared_discs(picture, moving, starts[~good], view.voting)
+        return join_outlines([sharp, smeared.chosen(smeared.steps >= _LEAST_STEP)])
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
         chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
@@ -239,17 +223,26 @@ class SceneModel:
                 view._replace(voting=view.voting._replace(smallest=low, largest=high))
                 for view in self.views
             ]
+        self._learn_looks(frames)
+
+    def _learn_looks(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        """Learn colours and sizes from the discs that move, or from all."""
+        self._known = None
         rows = [self.candidates(frame) for frame in frames]
         every = Candidates(
             join_outlines([row.outlines for row in rows]),
-            *(np.concatenate([row[k] for row in rows]) for k in (1, 2, 3)),
+            *(np.concatenate([row[k] for row in rows]) for k in (1, 2, 3, 4)),
         )
+        number = np.repeat(np.arange(len(rows)), [len(row.moving) for row in rows])
         good = every.outlines.support >= _GOOD_SUPPORT
-        moving = good & (every.moving >= _MOVING_SHARE)
+        moves = every.moving >= MOVING_SHARE
+        moving = good & moves & ~staying(every.outlines.discs, moves, number)
         enough = max(_LEAST_MOVING, _LEAST_MOVING_SHARE * good.sum())
         self.sees_motion = bool(moving.sum() >= enough)
+        self._moved = every.outlines.discs[moving]
         known = moving if self.sees_motion else good
         self._known = KnownBeads.of(every.colours[known], every.outlines.discs[known, 2])
+        self._rested = every.outlines.discs[self.alike(every) & good & ~moving]
 
     def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
         """The picture, for bright discs, dark ones, or both where both occur.
@@ -270,7 +263,7 @@ class SceneModel:
     def _view(self, frames: Sequence[NDArray[np.uint8]], *, moves: bool, sign: int) -> View:
         """A view of the frames with the size, brightness and edges of the discs in it."""
         low, high = (self.scale * radius for radius in self._look.radii)
-        noise = self.colours.noise
+        noise = self.colours.unrest if moves else self.colours.noise
         view = View(moves, Voting(low, high, sign, 1.0, noise), 0.0)
         step = usual_step(view.of(frames[-1], self.colours), noise)
         voting = view.voting._replace(step=step)
@@ -288,6 +281,12 @@ class SceneModel:
         usual = float(np.quantile(outlines.steps, 0.75))
         evidence = float((outlines.support**2 * outlines.steps).sum())
         return View(moves, voting._replace(step=step * usual), evidence)
+
+
+def _some(frames: Sequence[NDArray[np.uint8]], count: int) -> list[NDArray[np.uint8]]:
+    """So many frames at most, spread over all."""
+    chosen = np.linspace(0, len(frames) - 1, min(count, len(frames)))
+    return [frames[round(k)] for k in chosen]
 
 
 def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneModel:

@@ -25,6 +25,10 @@ _LEAST_MOVING = 2e-4
 # Noise of a pixel is not below that of rounding.
 _LEAST_NOISE = 0.3
 _BLUR_PX = 0.7
+# Changes that are wider are those of the light, [px].
+_WIDE_PX = 65
+# About so many frames tell which colours move.
+_FEW_FRAMES = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +43,8 @@ class SceneColours:
         Of blue, green and red, in the value that shows the beads.
     noise : float, [gray levels]
         Of this value, in a pixel.
+    unrest : float, [gray levels]
+        The same with slow light: what a pixel at rest differs by from the background.
     knows_background : bool
         Whether few enough pixels move to know what is behind the beads.
     """
@@ -46,6 +52,7 @@ class SceneColours:
     background: NDArray[np.uint8]
     weights: NDArray[np.float64]
     noise: float
+    unrest: float
     knows_background: bool = False
 
     def enlarged(self, scale: int) -> SceneColours:
@@ -65,9 +72,16 @@ class SceneColours:
         blue, green, red = cv2.split(cv2.absdiff(color, self.background))
         return _blurred(cv2.max(cv2.max(blue, green), red))
 
-    def moving(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """1 where a pixel differs from the background, else 0, (rows, columns)."""
-        limit = max(_DIFFERS * self.noise, _LEAST_LEVELS)
+    def moving(self, color: NDArray[np.uint8], levels: float = 0.0) -> NDArray[np.uint8]:
+        """1 where a pixel differs from the background, else 0, (rows, columns).
+
+        Parameters
+        ----------
+        color : ndarray of uint8, (rows, columns, 3), bgr
+        levels : float, optional, [gray levels]
+            Least difference; it is never below that of noise.
+        """
+        limit = max(_DIFFERS * self.unrest, _LEAST_LEVELS, levels)
         return np.asarray(cv2.threshold(self.difference(color), limit, 1, cv2.THRESH_BINARY)[1])
 
     def follow(self, color: NDArray[np.uint8]) -> None:
@@ -107,28 +121,32 @@ def scene_colours(
         Of the beads, where it is known.
     """
     background = _median(frames)
-    noise = np.array([_noise(frames[-1][:, :, k]) for k in range(3)])
+    noises = np.array([_noise(frames[-1][:, :, k]) for k in range(3)])
     if colour is None:
-        scatter = _moving_scatter(frames, background, noise)
-        scatter = _contrast_scatter(frames, noise) if scatter is None else scatter
+        scatter = _moving_scatter(frames, background, noises)
+        scatter = _contrast_scatter(frames, noises) if scatter is None else scatter
         weights = np.linalg.eigh(scatter)[1][:, -1]
     else:
         floor = np.median(background.reshape(-1, 3), axis=0)
-        weights = (colour - floor) / noise**2
+        weights = (colour - floor) / noises**2
         if not np.abs(weights).sum() > 0.0:
             weights = np.ones(3)
     # Positive where the picture gets brighter.
     weights = weights / np.abs(weights).sum()
     weights = weights if weights.sum() >= 0.0 or colour is not None else -weights
     mixed = frames[-1].astype(np.float32) @ weights.astype(np.float32)
-    colours = SceneColours(background=background, weights=weights, noise=_noise(mixed))
-    share = float(np.mean([colours.moving(frame).mean() for frame in frames]))
+    noise = _noise(mixed)
+    colours = SceneColours(background=background, weights=weights, noise=noise, unrest=noise)
+    share = float(np.mean([colours.moving(frame).mean() for frame in _few(frames)]))
     if len(frames) < 3 or share > BACKGROUND_SHARE:
         return colours
-    # Codecs smooth what the mask sees of the noise, but not how it changes.
-    still = background.astype(np.float32) @ weights.astype(np.float32)
-    changes = float(np.median(np.abs(mixed - still))) / 0.6745
-    return replace(colours, noise=max(colours.noise, changes), knows_background=True)
+    # Codecs smooth what the mask sees of the noise, but not how it changes; light changes widely.
+    changed = mixed - background.astype(np.float32) @ weights.astype(np.float32)
+    unrest = max(colours.noise, float(np.median(np.abs(changed))) / 0.6745)
+    changed -= cv2.blur(changed, (_WIDE_PX, _WIDE_PX))
+    # Beads reach as far in this difference, and may make it the larger one.
+    noise = max(colours.noise, min(unrest, float(np.median(np.abs(changed))) / 0.6745))
+    return replace(colours, noise=noise, unrest=unrest, knows_background=True)
 
 
 def _median(frames: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
@@ -140,6 +158,11 @@ def _median(frames: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
         middle = len(frames) // 2
         background[first : first + rows] = np.partition(part, middle, axis=0)[middle]
     return background
+
+
+def _few(frames: Sequence[NDArray[np.uint8]]) -> Sequence[NDArray[np.uint8]]:
+    """Some of the frames, spread over the film, the last one among them."""
+    return frames[::-1][:: max(1, len(frames) // _FEW_FRAMES)]
 
 
 def _noise(values: NDArray[np.uint8] | NDArray[np.float32]) -> float:
@@ -156,9 +179,11 @@ def _moving_scatter(
 ) -> NDArray[np.float64] | None:
     """Mean product of the colours in which moving pixels differ; None where hardly any moves."""
     scatter, count, total = np.zeros((3, 3)), 0, 0
-    for frame in frames:
-        difference = (frame.astype(np.float32) - background).reshape(-1, 3)
-        limit = np.maximum(_DIFFERS * noise, _LEAST_LEVELS).astype(np.float32)
+    limit = np.maximum(_DIFFERS * noise, _LEAST_LEVELS).astype(np.float32)
+    for frame in _few(frames):
+        # Every other pixel of every other row.
+        here, before = (image[::2, ::2].astype(np.float32) for image in (frame, background))
+        difference = (here - before).reshape(-1, 3)
         differs = difference[(np.abs(difference) > limit).any(axis=1)].astype(np.float64)
         scatter += differs.T @ differs
         count += len(differs)

@@ -65,3 +65,10 @@ def test_no_disc_is_no_circle():
     outlines = fit_outlines(drawn([]), np.empty((0, 3)), VOTING)
     assert outlines.discs.shape == (0, 3)
     assert outlines.support.shape == (0,)
+
+
+def test_discs_that_are_nowhere_and_pictures_of_a_pixel_have_no_support():
+    nowhere = np.array([[np.nan, 20.0, 10.0], [1e30, -1e30, 10.0], [50.0, 50.0, np.nan]])
+    assert (fit_outlines(drawn([]), nowhere, VOTING).support == 0.0).all()
+    pixel = np.full((1, 1), 90, np.uint8)
+    assert (fit_outlines(pixel, np.array([[0.0, 0.0, 10.0]]), VOTING).support == 0.0).all()

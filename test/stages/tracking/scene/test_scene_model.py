@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks.drawn_scenes import SCENES, DrawnScene, draw
 from benchmarks.recognition import drawn_score
-from nanorocks_ros.stages.tracking.scene.scene_model import BeadLook, scene_model
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.stages.tracking.scene.scene_model import scene_model
 
 
 @pytest.mark.parametrize('name', SCENES)

@@ -1,0 +1,303 @@
+"""Edges along the rays of a disc, and the outline through them, compiled.
+
+Tested by ``test/stages/tracking/scene/test_outline_fits.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nanorocks_ros.numerics.compiled import inlined, kernel
+from nanorocks_ros.numerics.small_cholesky import eliminate
+
+RAYS = 24
+RESULTS = 9
+"""Of an outline: column, row, radius, errors of both, support, step, smear, longest open part."""
+
+# Samples along a ray are this far apart at least, [px], and so many at most, by iteration.
+_SAMPLE_PX, _MAX_SAMPLES = 0.5, (16, 24)
+_LEAST_REACH_PX = 1.5
+# Edges this far from the outline do not count: part of the radius, and at least, [px].
+_OFF_SHARE, _OFF_PX = 0.12, 0.8
+# Smallest scatter of an edge, [px], and edges that tell an outline.
+_LEAST_SCATTER_PX, _LEAST_EDGES = 0.08, 6
+# Neighbouring rays share pixels.
+_CORRELATION_FACTOR = 1.6
+_ITERATIONS = 4
+# Part of the outline below which a disc is not fitted further.
+_LEAST_SUPPORT = 0.25
+
+
+class Search(NamedTuple):
+    """What edges are searched.
+
+    Parameters
+    ----------
+    sign : int
+        1: inside is brighter, -1: darker, 0: either.
+    least : float
+        Smallest step of an edge.
+    smallest, largest : float, [px]
+        Radii.
+    shape : ndarray (RAYS, n)
+        Cosine and sine of each ray, 1, and of smeared discs cosine and sine of twice its angle:
+        the outline is a sum of these.
+    """
+
+    sign: int
+    least: float
+    smallest: float
+    largest: float
+    shape: NDArray[np.float64]
+
+
+class Scratch(NamedTuple):
+    """Arrays that `fit_each` writes to; see `scratch`.
+
+    Of each ray, `edges` has the distance of its edge, the step, and 1 where there is one.
+    """
+
+    edges: NDArray[np.float64]
+    profile: NDArray[np.float64]
+    rises: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    off: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    matrix: NDArray[np.float64]
+    right: NDArray[np.float64]
+    fitted: NDArray[np.float64]
+
+
+def scratch(terms: int) -> Scratch:
+    """Arrays for outlines of so many terms."""
+    profile, rises = np.empty((2, _MAX_SAMPLES[1]))
+    weights, off = np.empty((2, RAYS))
+    normal, matrix = np.empty((2, terms, terms))
+    right, fitted = np.empty((2, terms))
+    edges = np.empty((RAYS, 3))
+    return Scratch(edges, profile, rises, weights, off, normal, matrix, right, fitted)
+
+
+@kernel
+def fit_each(
+    picture: NDArray[np.uint8],
+    discs: NDArray[np.float64],
+    search: Search,
+    reaches: tuple[float, float],
+    work: Scratch,
+    results: NDArray[np.float64],
+) -> None:
+    """Fit an outline to the edges around each disc.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, (rows, columns)
+    discs : ndarray (n, 3), [px]
+        Where to begin: column, row, radius.
+    search : Search
+    reaches : tuple of 2 floats
+        Part of the radius on either side of the outline that is searched, by iteration.
+    work : Scratch
+    results : ndarray (n, RESULTS)
+        Written.
+    """
+    terms = search.shape.shape[1]
+    for k in range(len(discs)):
+        for i in range(RESULTS):
+            results[k, i] = discs[k, i] if i < 3 else 0.0
+        for term in range(terms):
+            work.fitted[term] = 0.0
+        for turn in range(len(reaches)):
+            if turn > 0 and results[k, 5] < _LEAST_SUPPORT:
+                break
+            half_width = max(reaches[turn] * results[k, 2], _LEAST_REACH_PX)
+            samples = math.ceil(2.0 * half_width / _SAMPLE_PX) + 3
+            samples = min(_MAX_SAMPLES[turn], samples)
+            for ray in range(RAYS):
+                middle = results[k, 2]
+                for term in range(3, terms):
+                    middle += work.fitted[term] * search.shape[ray, term]
+                _edge(picture, results, k, search, ray, middle, half_width, samples, work)
+            _fit(search, results, k, work)
+
+
+@inlined
+def _edge(
+    picture: NDArray[np.uint8],
+    results: NDArray[np.float64],
+    k: int,
+    search: Search,
+    ray: int,
+    middle: float,
+    half_width: float,
+    samples: int,
+    work: Scratch,
+) -> None:
+    """Distance of the edge on a ray of disc `k`, its step, and 1 where there is one."""
+    pitch = 2.0 / (samples - 1)
+    across, down = search.shape[ray, 0], search.shape[ray, 1]
+    for i in range(samples):
+        along = max(middle + half_width * (i * pitch - 1.0), 0.0)
+        work.profile[i] = _value(
+            picture, results[k, 0] + across * along, results[k, 1] + down * along
+        )
+    # Step over a length of about two pixels.
+    half = max(1, round(1.0 / (pitch * half_width)))
+    count = samples - 2 * half
+    for i in range(count):
+        rise = work.profile[i] - work.profile[i + 2 * half]
+        work.rises[i] = abs(rise) if search.sign == 0 else search.sign * rise
+    best = _steepest(work.rises, count, half, pitch)
+    before, at, after = work.rises[best - 1], work.rises[best], work.rises[best + 1]
+    bend = before - 2.0 * at + after
+    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    place = (best + half) * pitch - 1.0 + pitch * min(max(shift, -0.5), 0.5)
+    work.edges[ray, 0], work.edges[ray, 1] = middle + half_width * place, at
+    usable = at > search.least and at >= before and at >= after
+    for end in range(2):
+        along = max(middle + (2 * end - 1) * half_width, 0.0)
+        x, y = results[k, 0] + across * along, results[k, 1] + down * along
+        usable &= 0.0 <= x < picture.shape[1] and 0.0 <= y < picture.shape[0]
+    work.edges[ray, 2] = 1.0 if usable else 0.0
+
+
+@inlined
+def _steepest(rises: NDArray[np.float64], count: int, half: int, pitch: float) -> int:
+    """Of the steepest places, among equal ones that nearest to where the outline was before."""
+    best, rated = 1, 0.0
+    for i in range(1, count - 1):
+        if rises[i] >= rises[i - 1] and rises[i] > rises[i + 1]:
+            rating = rises[i] * (1.0 - 0.5 * abs((i + half) * pitch - 1.0))
+            if rating > rated:
+                best, rated = i, rating
+    return best
+
+
+@inlined
+def _value(picture: NDArray[np.uint8], x: float, y: float) -> float:
+    """The picture between its pixels; beyond its border as on it."""
+    # Never below 0, so that numba need not count from the end; NaN counts as 0.
+    x = min(x, picture.shape[1] - 1.001) if x > 0.0 else 0.0
+    y = min(y, picture.shape[0] - 1.001) if y > 0.0 else 0.0
+    column, row = np.uint64(x), np.uint64(y)
+    next_column, next_row = column + np.uint64(1), row + np.uint64(1)
+    right, below = x - np.float64(column), y - np.float64(row)
+    upper = picture[row, column] + right * (
+        np.float64(picture[row, next_column]) - picture[row, column]
+    )
+    lower = picture[next_row, column] + right * (
+        np.float64(picture[next_row, next_column]) - picture[next_row, column]
+    )
+    return float(upper + below * (lower - upper))
+
+
+@inlined
+def _fit(search: Search, results: NDArray[np.float64], k: int, work: Scratch) -> None:
+    """The outline through the edges, without those that lie off, as linear least squares."""
+    terms = search.shape.shape[1]
+    edges, weights, off, fitted = work.edges, work.weights, work.off, work.fitted
+    for ray in range(RAYS):
+        weights[ray] = edges[ray, 2]
+    limit = 0.0
+    for _ in range(_ITERATIONS):
+        _sum_up(search.shape, work, 1e-9)
+        _solve(work.normal, work)
+        limit = max(_OFF_SHARE * abs(fitted[2]), _OFF_PX)
+        for ray in range(RAYS):
+            off[ray] = edges[ray, 0]
+            for term in range(terms):
+                off[ray] -= search.shape[ray, term] * fitted[term]
+            part = max(0.0, 1.0 - (off[ray] / (2.0 * limit)) ** 2)
+            weights[ray] = edges[ray, 2] * part * part
+    count, squares, steps = 0, 0.0, 0.0
+    for ray in range(RAYS):
+        weights[ray] = 0.0
+        if edges[ray, 2] > 0.0 and abs(off[ray]) < limit:
+            weights[ray] = 1.0
+            count += 1
+            squares += off[ray] * off[ray]
+            steps += edges[ray, 1]
+    results[k, 5] = count / RAYS if count >= _LEAST_EDGES else 0.0
+    results[k, 6] = steps / max(count, 1)
+    if count >= _LEAST_EDGES:
+        _move(search, results, k, work)
+    else:
+        for term in range(3, terms):
+            fitted[term] = 0.0
+    scatter = max(math.sqrt(squares / max(count - terms, 1)), _LEAST_SCATTER_PX)
+    _sum_up(search.shape, work, 1e-6)
+    variance = scatter * scatter * _CORRELATION_FACTOR
+    place = 0.5 * (_variance(work, 0) + _variance(work, 1))
+    results[k, 3] = math.sqrt(variance * place)
+    results[k, 4] = math.sqrt(variance * _variance(work, 2))
+
+
+@inlined
+def _move(search: Search, results: NDArray[np.float64], k: int, work: Scratch) -> None:
+    """Move disc `k` to what was fitted."""
+    fitted = work.fitted
+    most = 0.5 * results[k, 2]
+    for axis in range(2):
+        results[k, axis] += min(max(fitted[axis], -most), most)
+    results[k, 2] = min(max(fitted[2], 0.8 * search.smallest), 1.25 * search.largest)
+    if len(fitted) > 3:
+        results[k, 8] = _longest_gap(work.weights) / RAYS
+        results[k, 7] = math.sqrt(fitted[3] * fitted[3] + fitted[4] * fitted[4])
+
+
+@inlined
+def _longest_gap(weights: NDArray[np.float64]) -> int:
+    """Most successive rays without an edge on the outline, all around."""
+    gap, longest = 0, 0
+    for turn in range(2 * RAYS):
+        gap = 0 if weights[turn % RAYS] > 0.0 else gap + 1
+        longest = max(longest, gap)
+    return min(longest, RAYS)
+
+
+@inlined
+def _sum_up(shape: NDArray[np.float64], work: Scratch, ridge: float) -> None:
+    """Normal equations of the edges."""
+    normal, right = work.normal, work.right
+    terms = len(right)
+    for i in range(terms):
+        right[i] = 0.0
+        for j in range(terms):
+            normal[i, j] = ridge if i == j else 0.0
+    for ray in range(RAYS):
+        if work.weights[ray] > 0.0:
+            for i in range(terms):
+                part = work.weights[ray] * shape[ray, i]
+                right[i] += part * work.edges[ray, 0]
+                for j in range(i + 1):
+                    normal[i, j] += part * shape[ray, j]
+    for i in range(terms):
+        for j in range(i):
+            normal[j, i] = normal[i, j]
+
+
+@inlined
+def _solve(normal: NDArray[np.float64], work: Scratch) -> None:
+    """Solve the normal equations for `fitted`, by elimination."""
+    terms = len(work.right)
+    for i in range(terms):
+        work.fitted[i] = work.right[i]
+        for j in range(terms):
+            work.matrix[i, j] = normal[i, j]
+    eliminate(work.matrix, work.fitted)
+
+
+@inlined
+def _variance(work: Scratch, k: int) -> float:
+    """Element of the diagonal of the inverse of the normal equations."""
+    terms = len(work.right)
+    for i in range(terms):
+        work.right[i] = 1.0 if i == k else 0.0
+        for j in range(terms):
+            work.matrix[i, j] = work.normal[i, j]
+    eliminate(work.matrix, work.right)
+    return float(max(work.right[k], 0.0))
