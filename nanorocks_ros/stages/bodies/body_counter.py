@@ -45,7 +45,7 @@ _PRIOR_MERGES = 0.5
 _COMOVING_CHANCE_SHARE = 0.3
 # Shortest mean duration of a track, [s]; below, bonds cannot be told from broken tracks. In films
 # without sticking it is 7 to 100 s in trays 1, 3 and 5, without a false bond from a double
-# detection, and 1 to 3 s in trays 4 and 7.
+# detection, and 1 to 3 s in tray 4.
 _MAX_TRACK_BREAK_TIME = 5.0
 
 
@@ -76,6 +76,9 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         self._equal_sizes = np.array(
             [kind.diameter_low == kind.diameter_high for kind in tray.species]
         )
+        # The outlines of grains differ with their orientation, by more than their places are said
+        # to be uncertain: grains beside each other would look bonded.
+        self._has_grains = any(kind.properties.shape == 'grain' for kind in tray.species)
         self._bond_finder = BondFinder(self._encounter_rate, CollisionRate(tray))
         self.reset()
 
@@ -179,8 +182,11 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
     def _tracks_break_often(self) -> bool:
         """Whether tracks end too often for bonds to be found.
 
-        After the first merge the answer is no: tracks then end since beads occlude each other.
+        After the first merge the answer is no: tracks then end since beads occlude each other. Of
+        grains it is always yes.
         """
+        if self._has_grains:
+            return True
         if self._first_merge is not None:
             return False
         time = self._frames.last.time if self._frames else 0.0

@@ -81,6 +81,19 @@ def test_bodies_and_sizes_of_a_sticky_gas_agree_with_the_simulation(sticky):
     assert last.sizes.sum() == last.bodies.value
 
 
+def test_bodies_of_grains_are_not_counted(sticky):
+    """Their outlines change as they turn, so that free ones beside each other look bonded."""
+    (kind,) = TRAY.species
+    grains = replace(
+        TRAY, species=(replace(kind, properties=load_trays()[7].species[1].properties),)
+    )
+    frames = [tracks for tracks, _ in sticky]
+    for tray, gives in ((TRAY, True), (grains, False)):
+        counter = BodyCounter(PipelineSettings(), tray)
+        records = [record for tracks in frames for record in counter.push(tracks)]
+        assert bool([*records, *counter.flush()]) is gives
+
+
 def test_the_first_merge_has_the_time_of_the_simulated_one(sticky):
     counts, merges = _estimates_and_merges([tracks for tracks, _ in sticky])
     first = next(tracks.stamp_ns for tracks, b in sticky if np.unique(b).size < 15)
