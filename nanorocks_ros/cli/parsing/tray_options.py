@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.safe_text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,3 +79,9 @@ class _NumberOrFile(argparse.Action):
             namespace.trays = [*(namespace.trays or []), values]
         else:
             namespace.trays_file = values
+            name = printable(values)
+            print(
+                f'nanorocks: --tray {name}: taken as --trays-file, for this release only; use '
+                f'--trays-file {quote(name)}',
+                file=sys.stderr,
+            )

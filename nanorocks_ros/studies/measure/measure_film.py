@@ -15,6 +15,7 @@ from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
+from nanorocks_ros.studies.analysis.tray_words import tray_lines
 from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
 from nanorocks_ros.studies.measure.measure_report import write_measure_report
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.settings import PipelineSettings
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
 _TRACKS, _PICTURE = 'tracks.npz', 'tracks.png'
 _MAGNIFICATION = 2
@@ -68,8 +68,8 @@ class MeasurePlan:
     image_topic : str
     workers : Workers
         For the library of decays.
-    describe : callable
-        The cycles of a tray of an analysis in lines.
+    name_files : callable
+        Gives a text whose commands name the recording as the user did.
     """
 
     bag: Path
@@ -78,7 +78,7 @@ class MeasurePlan:
     settings: PipelineSettings
     image_topic: str
     workers: Workers
-    describe: Callable[[Analysis, int], list[str]]
+    name_files: Callable[[str], str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,9 +170,11 @@ def _measured_tray(
     height_known = not math.isnan(tray.dimensions[2])
     known = height_known and (film is None or film.container_known)
     unit = _length_unit(plan)
-    for verdict in tracked.verdicts[number]:
-        for line in verdict.lines():
-            teller.say(line)
+    recognition = [
+        plan.name_files(line) for verdict in tracked.verdicts[number] for line in verdict.lines()
+    ]
+    for line in recognition:
+        teller.say(line)
     speeds = track_speeds(records)
     with teller.progress('contacts') as progress:
         contacts = track_contacts(
@@ -187,7 +189,7 @@ def _measured_tray(
         container_known=known,
         verdicts=tracked.verdicts[number],
     )
-    decay_lines = _decay_lines(plan, step, teller)
+    decay_lines = [plan.name_files(line) for line in _decay_lines(plan, step, teller)]
     for line in decay_lines:
         teller.say(line)
     return MeasuredTray(
@@ -195,9 +197,7 @@ def _measured_tray(
         unit=unit,
         speeds=speeds,
         contacts=contacts,
-        recognition=tuple(
-            line for verdict in tracked.verdicts[number] for line in verdict.lines()
-        ),
+        recognition=tuple(recognition),
         lines=tuple(lines),
         decay=tuple(decay_lines),
     )
@@ -224,7 +224,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     said = {line for verdict in step.verdicts for line in verdict.lines()}
     lines = [
         f'decay: {line.strip()}'
-        for line in plan.describe(analysis, number)
+        for line in tray_lines(analysis, analysis.trays[number])
         if line.strip() not in said
     ]
     write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())
