@@ -20,7 +20,7 @@ from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_b
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
 from nanorocks_ros.studies.measure.measure_report import write_measure_report
 from nanorocks_ros.studies.measure.measured_folder import TRACKS, prepare_folder, write_measured
-from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ, MeasuredTray
+from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ, DECAY_PREFIX, MeasuredTray
 from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
@@ -223,7 +223,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
         return [f'{DECAY_NOT_READ}; {error}']
     said = {line for verdict in step.verdicts for line in verdict.lines()}
     lines = [
-        f'decay: {line.strip()}'
+        f'{DECAY_PREFIX}{line.strip()}'
         for line in tray_lines(analysis, analysis.trays[number])
         if line.strip() not in said
     ]
