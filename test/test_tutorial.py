@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from page_code import ROOT
 from page_runs import not_printed, run_page, same_word
@@ -15,6 +17,11 @@ def test_the_tutorial_does_and_prints_what_it_says(tmp_path):
     assert runs == 6
     for name in ('film.avi', 'mine.png', 'results/report.html', 'decay.png'):
         assert (tmp_path / name).stat().st_size > 1000
+    report = (tmp_path / 'results/report.html').read_text(encoding='utf-8')
+    conclusion = report.partition('class="conclusion">')[2].partition('</p>')[0]
+    # What the page says under "Read the numbers elsewhere": the restitution to quote comes first.
+    assert re.match(r'Tray 1: beads 0\.8[01]\d* \[0\.7\d+, 0\.8\d+\] \(95 %\)', conclusion)
+    assert conclusion.index('from decay and contacts together') < conclusion.index('alone')
 
 
 @pytest.mark.parametrize(

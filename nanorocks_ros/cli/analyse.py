@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.cli.remedies import results_beside, with_own_files
+from nanorocks_ros.cli.remedies import about_own_recording, results_beside, with_own_files
 from nanorocks_ros.errors import NanorocksError
 
 if TYPE_CHECKING:
@@ -128,7 +128,8 @@ def _run_one(options: argparse.Namespace) -> int:
     for notice in analysis.notices:
         print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
     if options.json:
-        print(json.dumps(as_json(analysis), allow_nan=False))
+        values = about_own_recording(as_json(analysis), options)
+        print(json.dumps(values, allow_nan=False))
     else:
         _print(analysis, options)
     if written:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 SettingsType = TypeVar('SettingsType')
 _LOGGER = logging.getLogger(__name__)
 _SWITCH = 'on', 'off'
+_EMPTY = 'empty'
 
 
 def add_flags(
@@ -64,12 +65,14 @@ def add_flag(
 ) -> argparse.Action:
     """Add the flag of one setting; `flags` in place of that of its name."""
     unit = f' [{row.unit}]' if row.unit else ''
+    # What an empty value means stands in the text already.
+    told = '' if default == _EMPTY and f'{_EMPTY}: ' in row.doc else f'; default {default}'
     action: argparse.Action = group.add_argument(
         *(flags or (flag_of(row.name),)),
         dest=row.name,
         metavar=_placeholder(row),
         nargs='*' if isinstance(row.default, tuple) else None,
-        help=f'{row.doc}{unit}; default {default}'.replace('%', '%%'),
+        help=f'{row.doc}{unit}{told}'.replace('%', '%%'),
     )
     words = row.bounds.choices or (_SWITCH if isinstance(row.default, bool) else ())
     # Texts without choices are files.
@@ -108,7 +111,7 @@ def add_bag(parser: CommandParser, skip: set[str] | None = None, *, many: bool =
             'bags', nargs='+', metavar='BAG', help=f"{kind}; many, a folder of them, or 'bags/*'"
         )
     else:
-        parser.add_argument('bag', help=kind)
+        parser.add_argument('bag', metavar='BAG', help=kind)
     accept_films(parser, 'bags' if many else 'bag')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')
     parser.add_argument(
@@ -132,10 +135,10 @@ def flag_of(name: str) -> str:
 
 def _default_text(row: SettingRow) -> str:
     if isinstance(row.default, tuple):
-        return ' '.join(str(value) for value in row.default) or 'empty'
+        return ' '.join(str(value) for value in row.default) or _EMPTY
     if isinstance(row.default, bool):
         return _SWITCH[0] if row.default else _SWITCH[1]
-    return str(row.default) if row.default != '' else 'empty'
+    return str(row.default) if row.default != '' else _EMPTY
 
 
 def settings_from(

@@ -7,13 +7,13 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.named_recordings import with_commands
+
 if TYPE_CHECKING:
     import argparse
 
 # Commands in remedies that describe a tray by its number alone.
 _BY_NUMBER = re.compile(r'nanorocks (?:library|cluster-curve|simulate) --trays? \d+')
-# Commands in remedies that name no recording.
-_ON_RECORDING = re.compile(r'nanorocks (look|speeds|track|measure|statistics) (?:BAG|FILM)\b')
 # What describes a recording on the command line: the flag by the name of its value.
 _DESCRIPTION = {
     'trays': '--trays',
@@ -56,10 +56,16 @@ def with_own_files(text: str, options: argparse.Namespace | None) -> str:
         return text
     trays_file = _words(options, {'trays_file': '--trays-file'})
     text = _BY_NUMBER.sub(lambda match: shlex.join([*match[0].split(), *trays_file]), text)
+    named_text: str = about_own_recording(text, options)
+    return named_text
+
+
+def about_own_recording(values: Any, options: argparse.Namespace) -> Any:
+    """Texts, at any depth of lists and dicts, whose commands have the recording of the user."""
     named: list[str] = getattr(options, 'named', [])
     if len(named) != 1:
-        return text
-    return _ON_RECORDING.sub(lambda match: _on_recording(match[1], named[0], options), text)
+        return values
+    return with_commands(values, lambda command: _on_recording(command, named[0], options))
 
 
 def results_beside(recording: str, kind: str) -> str:

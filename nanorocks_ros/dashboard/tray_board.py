@@ -26,7 +26,7 @@ from nanorocks_ros.records import (
     SpeedEstimate,
 )
 from nanorocks_ros.records.headlines import reason_for_contacts
-from nanorocks_ros.records.result_words import flags_in_words, reason_of
+from nanorocks_ros.records.result_words import LOOK, LOOK_LIVE, flags_in_words, reason_of
 from nanorocks_ros.wire.flat_records import flat_names, flat_value
 from nanorocks_ros.wire.products import CURVES
 
@@ -225,7 +225,10 @@ def as_fields(record: ArrayRecord) -> dict[str, Any]:
             continue
         value = flat_value(record, name)
         if isinstance(value, Quality):
-            elements['flags'] = [f'{flag.text}; {flag.remedy}' for flag in flags_in_words(value)]
+            elements['flags'] = [
+                f'{flag.text}; {flag.remedy.replace(LOOK, LOOK_LIVE)}'
+                for flag in flags_in_words(value)
+            ]
         if isinstance(value, IntFlag):
             value = value.names() if hasattr(value, 'names') else int(value)
         elif isinstance(value, IntEnum):

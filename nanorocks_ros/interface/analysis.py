@@ -93,6 +93,7 @@ def analyse(
                 AnalysedRecording(
                     name=own.name,
                     source=own.bag,
+                    path=str(own.bag),
                     settings=recorded.settings,
                     analysis=analysis,
                     tracked=None if kept is None else kept.tracked(analysis, recorded.settings),

@@ -39,6 +39,7 @@ def analysis_of(folder: Path) -> AnalysisResult:
             AnalysedRecording(
                 name=own.source,
                 source=mark.parent,
+                path=own.source,
                 settings=own.settings,
                 analysis=own.analysis,
                 run=own.run,

@@ -5,7 +5,7 @@ Tested by ``test/interface/test_analysis.py``.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import frame_of, joined, table_frame, with_column
 from nanorocks_ros.interface.result import Result, Summary, run_words
 from nanorocks_ros.outputs.html_report import with_interval
+from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.records import CorEstimate, headline_in_words
 from nanorocks_ros.records.result_words import reason_of
@@ -59,7 +60,8 @@ class AnalysedRecording:
 
     Parameters
     ----------
-    name : str
+    name, path : str
+        Of the recording, for tables and for commands in remedies.
     source : Path
     settings : PipelineSettings
     analysis : Analysis
@@ -71,6 +73,7 @@ class AnalysedRecording:
 
     name: str
     source: Path
+    path: str
     settings: PipelineSettings
     analysis: Analysis
     tracked: TrackedBag | None = None
@@ -198,7 +201,8 @@ class AnalysisResult(Result):
             cors = last_of_each_cycle(recording.analysis.trays[tray].cors)
             frame = frame_of(CorEstimate, cors, recording.analysis.epoch_ns)
             reasons = [reason_of(cor) for cor in cors]
-            texts = [None if why is None else f'{why.text}; {why.remedy}' for why in reasons]
+            texts = [why and f'{why.text}; {why.remedy}' for why in reasons]
+            texts = with_recording(texts, recording.path)
             return with_column(frame, len(frame.columns), 'reason', pd.Series(texts, dtype=object))
 
         return self._joined(cycles)
@@ -241,17 +245,22 @@ class AnalysisResult(Result):
 
     def _summary(self) -> Summary:
         rows: list[tuple[str, ...]] = []
-        flags: Counter[str] = Counter()
+        flags: dict[str, list[str]] = defaultdict(list)
         lines: list[str] = []
         for recording in self._recordings:
             for tray, results in recording.analysis.trays.items():
                 rows += _cycle_rows(recording, tray, results, flags)
+                wrong: list[str] = []
                 reason = tray_reason(results)
                 if reason is not None:
-                    lines.append(f'tray {tray}: no COR: {reason.text}; {reason.remedy}')
+                    wrong.append(f'tray {tray}: no COR: {reason.text}; {reason.remedy}')
                 if not all(verdict.usable for verdict in results.verdicts):
-                    lines += [line for verdict in results.verdicts for line in verdict.lines()]
-        lines += [f'{text} ({counted(number, "cycle")})' for text, number in flags.items()]
+                    wrong += [line for verdict in results.verdicts for line in verdict.lines()]
+                lines += with_recording(wrong, recording.path)
+        lines += [
+            f'{with_recording(text, paths[0])} ({counted(len(paths), "cycle")})'
+            for text, paths in flags.items()
+        ]
         title = f'{counted(len(self._recordings), "recording")}, {counted(len(rows), "cycle")}'
         left_out = len(rows) - _MOST_SHOWN
         if left_out > 0:
@@ -265,9 +274,9 @@ class AnalysisResult(Result):
 
 
 def _cycle_rows(
-    recording: AnalysedRecording, tray: int, results: TrayResults, flags: Counter[str]
+    recording: AnalysedRecording, tray: int, results: TrayResults, flags: dict[str, list[str]]
 ) -> list[tuple[str, ...]]:
-    """A row of the summary for each cycle; what is wrong is counted in `flags`."""
+    """A row of the summary for each cycle; `flags` gets the recording for each flag."""
     cycles = last_of_each_cycle(results.cors)
     used = used_speeds(results.speeds, cycles, wall_prior(recording.analysis.prior))
     ends = ends_of_cycles(results.clusters)
@@ -276,10 +285,10 @@ def _cycle_rows(
         words = cycle_as_json(cor, end_of_cycle(ends, cor), used[cor.cycle])
         reason = words['reason']
         if reason is not None:
-            flags[f'no COR: {reason["text"]}; {reason["remedy"]}'] += 1
+            flags[f'no COR: {reason["text"]}; {reason["remedy"]}'].append(recording.path)
         for flag in words['flags']:
             name = flag['name'].replace('_', ' ')
-            flags[f'{name}: {flag["text"]}; {flag["remedy"]}'] += 1
+            flags[f'{name}: {flag["text"]}; {flag["remedy"]}'].append(recording.path)
         beads, walls = (
             with_interval(value.value, (value.lower, value.upper))
             for value in (cor.restitution, cor.wall_restitution)

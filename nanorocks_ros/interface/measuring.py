@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from nanorocks_ros.interface.measure_result import MeasureResult
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.studies.analysis.tray_words import tray_lines
+from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.studies.film_import.film_cache import cache_folder
 from nanorocks_ros.studies.measure.measure_film import MeasurePlan, measure_film
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.interface.inputs import FilmDescription, PathLike
     from nanorocks_ros.jobs.progress import Progress
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
 
 def measure(
@@ -89,15 +89,11 @@ def measure(
             settings=own.recorded.settings,
             image_topic=image_topic,
             workers=Workers(processes=workers),
-            describe=_lines,
+            name_files=partial(with_recording, recording=Path(film)),
         )
         teller = _Teller(shown=progress)
         measure_film(plan, teller)
         return MeasureResult(plan.folder, own.notices)
-
-
-def _lines(analysis: Analysis, number: int) -> list[str]:
-    return tray_lines(analysis, analysis.trays[number])
 
 
 def _folder(film: PathLike) -> Path:

@@ -5,6 +5,7 @@ Tested by ``test/interface/test_measuring.py``.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -16,6 +17,7 @@ from nanorocks_ros.interface.record_frames import table_frame
 from nanorocks_ros.interface.result import Result, Summary
 from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import TWO_COLUMNS
+from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import columns_of, track_pieces
 from nanorocks_ros.studies.inspection.track_overlay import overlay
@@ -77,15 +79,16 @@ def track(
             tracked = track_bag(
                 own.recording.bag, own.recorded.settings, image_topic=image_topic, progress=show
             )
-        return TrackResult(tracked, own.recording.name, (*own.notices, *tracked.notices))
+        return TrackResult(tracked, Path(film), (*own.notices, *tracked.notices))
 
 
 class TrackResult(Result):
     """Tracks of all beads of a film. `nanorocks_ros.track` makes it."""
 
-    def __init__(self, tracked: TrackedBag, name: str, notices: tuple[str, ...]) -> None:
+    def __init__(self, tracked: TrackedBag, film: Path, notices: tuple[str, ...]) -> None:
+        name = film.resolve().name
         super().__init__(provenance={'film': name}, notices=notices, usable=tracked.usable)
-        self._tracked = tracked
+        self._tracked, self._film = tracked, film
 
     @property
     def tracks(self) -> pd.DataFrame:
@@ -105,7 +108,7 @@ class TrackResult(Result):
             for number, records in self._tracked.tracks.items()
         ]
         lines = [
-            line
+            with_recording(line, self._film)
             for verdicts in self._tracked.verdicts.values()
             for verdict in verdicts
             for line in verdict.lines()

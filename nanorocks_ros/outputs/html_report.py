@@ -24,6 +24,7 @@ _TYPES = {'.png': 'image/png', '.jpg': 'image/jpeg'}
 # A cell that begins so holds numbers, which stay in one line up to this length.
 _NUMBER = re.compile(r'[-+−–]?(\d|–$)')
 _LONGEST_NUMBER = 40
+_LETTERS = {' +- ': ' ± ', '/s^2': '/s²', ' um/': ' µm/'}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,10 +53,13 @@ class Picture:
         PNG or JPEG.
     caption : str
         Also what is read where it cannot be seen.
+    has_text : bool
+        On a phone it is as large as its text needs, and scrolls; without text it fits the page.
     """
 
     path: Path
     caption: str
+    has_text: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +133,14 @@ def _part(part: str | Table | Picture | Erratum) -> str:
         return _picture(part)
     if isinstance(part, Erratum):
         return f'<p class="errs"><b>Where the paper errs.</b> {html.escape(part.text)}</p>\n'
-    return f'<p>{html.escape(part)}</p>\n'
+    return f'<p>{html.escape(_typeset(part))}</p>\n'
+
+
+def _typeset(text: str) -> str:
+    """A line of the terminal in the letters of a page."""
+    for plain, letters in _LETTERS.items():
+        text = text.replace(plain, letters)
+    return text
 
 
 def made_line(command: str = '') -> str:
@@ -172,8 +183,9 @@ def _picture(picture: Picture) -> str:
         ) from error
     kind = _TYPES[picture.path.suffix]
     caption = html.escape(picture.caption)
+    kinds = 'picture text' if picture.has_text else 'picture'
     return (
-        f'<figure class="picture"><img alt="{caption}" src="data:{kind};base64,{content}">'
+        f'<figure class="{kinds}"><img alt="{caption}" src="data:{kind};base64,{content}">'
         f'<figcaption>{caption}</figcaption></figure>\n'
     )
 

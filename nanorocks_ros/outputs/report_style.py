@@ -22,7 +22,7 @@ figure { margin: 1rem 0; } figcaption { padding: .3rem 0; }
 figure img { max-width: 100%; height: auto; background: #fff; padding: 4px; border-radius: 4px; }
 .scroll { overflow-x: auto; }
 @media (max-width: 600px) {
-  figure.picture { overflow-x: auto; } figure.picture img { width: 640px; max-width: none; } }
+  figure.text { overflow-x: auto; } figure.text img { width: 640px; max-width: none; } }
 table { border-collapse: collapse; font-size: .92rem; overflow-wrap: normal; }
 th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: left;
   vertical-align: top; }

@@ -49,15 +49,19 @@ class FlagWords(NamedTuple):
     remedy: str
 
 
-_LOOK = 'look at the picture with `nanorocks look BAG -o steps.png`'
+LOOK = 'look at the picture with `nanorocks look BAG -o steps.png`'
+"""A remedy where a recording is analysed; BAG stands for its name."""
+LOOK_LIVE = 'look at the picture of the tray on this page'
+"""The same where there is no recording."""
+
 FLAGS = {
     Quality.SATURATED: Words(
         'more than 1 % of the pixels are at full scale', 'reduce the exposure; speeds still hold'
     ),
-    Quality.LOW_CONTRAST: Words('dark and bright hardly differ: no beads, or no light', _LOOK),
+    Quality.LOW_CONTRAST: Words('dark and bright hardly differ: no beads, or no light', LOOK),
     Quality.FEW_BEADS: Words(
         'the tracks do not show all beads, or are not reliable',
-        f'{_LOOK}; speeds of the structure function still hold',
+        f'{LOOK}; speeds of the structure function still hold',
     ),
     Quality.GLARE: Words(
         'reflections hide more than 1 % of the tray', 'move the lamp, or trust slow beads less'
@@ -81,7 +85,7 @@ FLAGS = {
     Quality.WRONG_SCALE: Words(
         'the trays are not where the settings say, or rulers of the scale differ by more than '
         '5 %; a notice says which',
-        f'{_LOOK}; set --preprocess-pixels-per-metre or --preprocess-regions-px, or calibrate',
+        f'{LOOK}; set --preprocess-pixels-per-metre or --preprocess-regions-px, or calibrate',
     ),
     Quality.UNCERTAIN: Words(
         'speeds may be wrong by more than 20 %, or 10 % for crowded grains',
@@ -134,7 +138,7 @@ NO_SHAKING = Words(
     'film the shaking and the rest before it; if the film shows it, lower --speed-shake-ratio '
     'or --preprocess-shake-speed; contacts alone need none: nanorocks measure FILM',
 )
-NO_SPEEDS = Words('no speed could be measured', _LOOK)
+NO_SPEEDS = Words('no speed could be measured', LOOK)
 METHODS = {
     SpeedMethod.TRACKING: 'tracking',
     SpeedMethod.STRUCTURE_FUNCTION: 'structure function',

@@ -8,7 +8,7 @@ from argparse import Namespace
 import pytest
 
 from nanorocks_ros.cli.main import build_parser, main
-from nanorocks_ros.cli.remedies import with_own_files
+from nanorocks_ros.cli.remedies import about_own_recording, with_own_files
 
 TEXT = 'make one: nanorocks library --tray 3 -o tray_3.npz, and pass it'
 TRAY = """materials:
@@ -53,6 +53,16 @@ def test_several_recordings_are_not_named():
     assert (
         with_own_files('nanorocks look BAG', Namespace(named=['a', 'b'])) == 'nanorocks look BAG'
     )
+
+
+def test_remedies_of_json_repeat_the_recording_and_its_options():
+    options = build_parser().parse_args(['analyse', 'x', '--trays', '3', '--json'])
+    options.named = ['run 7']
+    values = {'flags': [{'name': 'glare', 'remedy': 'see `nanorocks look BAG`'}], 'reason': None}
+    assert about_own_recording(values, options) == {
+        'flags': [{'name': 'glare', 'remedy': "see `nanorocks look 'run 7' --trays 3`"}],
+        'reason': None,
+    }
 
 
 def test_commands_in_remedies_can_be_parsed():

@@ -253,6 +253,15 @@ def test_what_is_not_known_is_null_and_states_are_words(board):
     assert news['description'] == '15 acrylic 2 mm'
 
 
+def test_remedies_of_a_live_tray_need_no_recording(board):
+    every = ~Quality(0)
+    board.take(replace(speed(2.0), quality=every), 0.0)
+    flags = board.news(Cursor(), 0.0)['trays']['1']['latest']['speed']['flags']
+    assert len(flags) == len(every.names())
+    assert any('on this page' in words for words in flags)
+    assert not any('BAG' in words for words in flags)
+
+
 def test_an_undetermined_restitution_says_why(board):
     board.take(replace(cor(2.0), status=CorStatus.NO_DECAY), 0.0)
     latest = board.news(Cursor(), 0.0)['trays']['1']['latest']['cor']

@@ -57,6 +57,20 @@ def test_pictures_are_inside_the_file(tmp_path):
     assert not any(name in ('script', 'link') for name, _ in page.tags)
 
 
+@pytest.mark.parametrize('has_text', [True, False])
+def test_only_a_picture_with_text_is_wider_than_a_phone(tmp_path, has_text):
+    (tmp_path / 'a.png').write_bytes(b'')
+    picture = Picture(path=tmp_path / 'a.png', caption='beads', has_text=has_text)
+    page = page_of(tmp_path, [Section(title='beads', parts=[picture])])
+    (attributes,) = [own for tag, own in page.tags if tag == 'figure']
+    assert ('text' in attributes['class'].split()) == has_text
+
+
+def test_a_line_of_the_terminal_is_set_in_the_letters_of_a_page(tmp_path):
+    page = page_of(tmp_path, [Section(title='a', parts=['drag 0 +- 0.2 /s, below 3 um/s^2'])])
+    assert 'drag 0 ± 0.2 /s, below 3 µm/s²' in page.texts
+
+
 def test_whatever_texts_hold_is_text(tmp_path):
     table = Table(head=(HOSTILE,), rows=[(HOSTILE,)], caption=HOSTILE)
     parts = [HOSTILE, table, Erratum(text=HOSTILE)]

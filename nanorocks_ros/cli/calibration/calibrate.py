@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('recording', help='rosbag2 folder, .mcap file, video or folder of images')
     accept_films(parser, 'recording')
     parser.add_argument('-o', '--output', help='calibration file to write, YAML')
-    parser.add_argument('--picture', help='picture of the calibration to write, PNG or .jpg')
+    parser.add_argument('--picture', help='picture of the calibration to write, .png or .jpg')
     parser.add_argument(
         '--show', metavar='YAML', help='show this calibration instead of estimating one'
     )

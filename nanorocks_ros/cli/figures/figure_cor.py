@@ -189,7 +189,7 @@ def _data(options: argparse.Namespace, source: Path) -> CorData:
 
     table, number = speed_table(source, options.tray)
     if number is None:
-        raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
+        raise ConfigurationError(str(table), 'does not say of which tray', 'add --tray K')
     tray = tray_by_number(trays_of_results(table.parent), number)
     cycles = read_cycles(table)
     window = cooling_window(table)

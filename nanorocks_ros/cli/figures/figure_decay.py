@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     check_outputs({'--output': path}, {'--output': _PICTURES}, force=options.force)
     table, number = speed_table(Path(options.speeds), options.tray)
     if number is None:
-        raise ConfigurationError('--tray', 'cannot be read from the file name', 'name the tray')
+        raise ConfigurationError(str(table), 'does not say of which tray', 'add --tray K')
     tray = tray_by_number(trays_of_results(table.parent, options.trays_file), number)
     cycles = read_cycles(table)
     values = _draw_figure(options, table, tray, cycles)

@@ -10,6 +10,7 @@ import json
 import shlex
 import sys
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.recorded_experiment import RecordedSettings
     from nanorocks_ros.jobs.progress import Progress
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
 _EPILOG = """\
 Examples:
@@ -76,6 +76,7 @@ class _Terminal:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, print and write, and return the exit code."""
+    from nanorocks_ros.cli.remedies import with_own_files
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.measure.measure_film import MeasurePlan, measure_film
@@ -89,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
         settings=recorded.settings,
         image_topic=options.image_topic,
         workers=Workers(processes=options.workers),
-        describe=_described,
+        name_files=partial(with_own_files, options=options),
     )
     try:
         measured = measure_film(plan, _Terminal(options))
@@ -119,9 +120,3 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
         )
     print_notices(recorded.notices)
     return recorded
-
-
-def _described(analysis: Analysis, number: int) -> list[str]:
-    from nanorocks_ros.studies.analysis.tray_words import tray_lines
-
-    return tray_lines(analysis, analysis.trays[number])

@@ -61,7 +61,10 @@ def run(options: argparse.Namespace) -> int:
     bag = tracked_bag(options)
     compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:
-        print(json.dumps(_as_json(bag, compared), allow_nan=False))
+        from nanorocks_ros.cli.remedies import about_own_recording
+
+        values = about_own_recording(_as_json(bag, compared), options)
+        print(json.dumps(values, allow_nan=False))
     else:
         _print(bag, compared, options)
     _write(options, bag)

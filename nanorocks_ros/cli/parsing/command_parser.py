@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import os
+import re
+from itertools import pairwise
+from shlex import quote
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from nanorocks_ros.errors import did_you_mean
@@ -11,6 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
 _ALL = '--help-all'
+_MISSING = 'arguments are required'
+# Options that take several numbers also take the words behind them.
+_NO_NUMBER = re.compile(r"invalid (?:float|int) value: '(.+)'")
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -25,6 +32,8 @@ class CommandParser(argparse.ArgumentParser):
         # A help of its own.
         options['add_help'] = False
         super().__init__(*arguments, **options)
+        self.description = _as_sentence(self.description or '')
+        self._words: Sequence[str] = ()
         self._rare: list[argparse.Action] = []
         self._sections: Mapping[str, Iterable[str]] = {}
         self.add_argument('-h', '--help', action=_Help, help='show the everyday options')
@@ -85,13 +94,28 @@ class CommandParser(argparse.ArgumentParser):
             self.print_help()
             self.exit()
         self._check_flags(words)
+        self._words = words
         return super().parse_known_args(words, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Print one line and end with exit code 2."""
         text = ' '.join(message.removeprefix('argument ').split())
-        hint = '' if '; ' in text else f'; see {self.prog} --help'
+        remedy = self._name_behind_numbers(text) or f'see {self.prog} --help'
+        hint = '' if '; ' in text else f'; {remedy}'
         self.exit(2, f'nanorocks: {text}{hint}\n')
+
+    def _name_behind_numbers(self, message: str) -> str:
+        """The remedy where an option that takes several values took the name of a file, too."""
+        if (match := _NO_NUMBER.search(message)) is not None:
+            return swallowed_name(match[1])
+        if _MISSING not in message:
+            return ''
+        behind = [
+            word
+            for before, word in pairwise(self._words)
+            if not before.startswith('-') and not word.startswith('-')
+        ]
+        return next((remedy for word in behind if (remedy := swallowed_name(word))), '')
 
     def described(self) -> list[argparse.Action]:
         """All arguments and options that have a help."""
@@ -205,3 +229,13 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 def offer(action: argparse.Action, words: Sequence[str]) -> None:
     """What a shell offers for an option that checks its value itself; nothing without words."""
     action.words = tuple(words)  # type: ignore[attr-defined]
+
+
+def swallowed_name(word: str) -> str:
+    """The remedy where an option took the name of a file as a value; '' if it is no file."""
+    return f'write {quote(word)} before the options' if os.path.exists(word) else ''
+
+
+def _as_sentence(text: str) -> str:
+    """A text that begins with a capital letter and ends with a full stop."""
+    return f'{text[:1].upper()}{text[1:].removesuffix(".")}.' if text else ''

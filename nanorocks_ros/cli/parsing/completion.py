@@ -20,7 +20,7 @@ For one shell, or for all new ones:
   nanorocks completion bash >~/.local/share/bash-completion/completions/nanorocks
   nanorocks completion zsh >~/.zfunc/_nanorocks     # a folder of your fpath, before compinit
 
-The script stands still: make it again after an update.
+The script does not update itself: make it again after an update of the package.
 """
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.parsing.command_parser import swallowed_name
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.outputs.safe_text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,7 +39,10 @@ def add_tray_or_file(parser: argparse.ArgumentParser) -> None:
 
 def not_a_number(word: str) -> tuple[str, str]:
     """What is wrong with a word in place of the number of a tray, and what to do."""
-    return f'{word!r} is no number of a tray', f'a file of trays is --trays-file {quote(word)}'
+    remedy = f'a file of trays is --trays-file {quote(word)}'
+    if not word.endswith(('.yaml', '.yml')):
+        remedy = swallowed_name(word) or remedy
+    return f'{word!r} is no number of a tray', remedy
 
 
 def _number(word: str) -> int:
@@ -77,3 +83,9 @@ class _NumberOrFile(argparse.Action):
             namespace.trays = [*(namespace.trays or []), values]
         else:
             namespace.trays_file = values
+            name = printable(values)
+            print(
+                f'nanorocks: --tray {name}: taken as --trays-file, for this release only; use '
+                f'--trays-file {quote(name)}',
+                file=sys.stderr,
+            )

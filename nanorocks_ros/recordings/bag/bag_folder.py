@@ -22,7 +22,7 @@ from nanorocks_ros.recordings.sqlite import sqlite_file
 from nanorocks_ros.recordings.sqlite.sqlite_file import SqliteFile
 from nanorocks_ros.recordings.storage import StorageFile
 
-_KINDS = 'a rosbag2 folder or an .mcap file'
+_KINDS = 'a rosbag2 folder or an .mcap file; commands that measure take films as well'
 METADATA = 'metadata.yaml'
 ROS1_MAGIC = b'#ROSBAG V'
 STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})

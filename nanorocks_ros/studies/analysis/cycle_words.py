@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.outputs.html_report import with_error
 from nanorocks_ros.records import (
     NS,
     CorStatus,
@@ -34,7 +35,13 @@ from nanorocks_ros.records.result_words import (
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from nanorocks_ros.records import ClusterEstimate, CorEstimate, Interval, SpeedEstimate
+    from nanorocks_ros.records import (
+        ClusterEstimate,
+        CorEstimate,
+        Interval,
+        Measured,
+        SpeedEstimate,
+    )
     from nanorocks_ros.settings import PriorSettings
     from nanorocks_ros.studies.analysis.offline_analysis import TrayResults
 
@@ -290,10 +297,7 @@ def _decay_lines(cor: CorEstimate) -> list[str]:
         paper = ''
         if math.isfinite(cor.paper_restitution):
             paper = f'; the closed form of the paper makes it {cor.paper_restitution:.3f}'
-        lines.append(
-            f'  decay: v0 {_MM * cor.initial_speed.value:.2f} mm/s, '
-            f'tau {cor.haff_time.value:.2f} s{paper}'
-        )
+        lines.append(f"  Haff's law: {_haff_text(cor.initial_speed, cor.haff_time)}{paper}")
     for name, speed, time in zip(
         ('first', 'second'),
         cor.species_initial_speeds,
@@ -301,10 +305,15 @@ def _decay_lines(cor: CorEstimate) -> list[str]:
         strict=False,
     ):
         if fitted(speed) and fitted(time):
-            lines.append(
-                f'  {name} species: v0 {_MM * speed.value:.2f} mm/s, tau {time.value:.2f} s'
-            )
+            lines.append(f'  {name} species: {_haff_text(speed, time)}')
     return lines
+
+
+def _haff_text(speed: Measured, time: Measured) -> str:
+    """Speed at the start and Haff time, with their standard errors."""
+    speed_text = with_error(speed.value, speed.error, _MM)
+    time_text = with_error(time.value, time.error)
+    return f'v0 {speed_text} mm/s, tau {time_text} s'.replace('±', '+-')
 
 
 def _used_text(cor: CorEstimate, used: UsedSpeeds) -> str:

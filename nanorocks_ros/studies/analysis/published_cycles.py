@@ -96,23 +96,41 @@ def published_lines(cors: list[CorEstimate], truth: Truth | None = None) -> list
         Empty where nothing was published and nothing is known.
     """
     lines = []
+    if cors:
+        mark = ':' if len(cors) == 1 else ','
+        lines = [f'analyse{mark} {published_text(cors)}']
     if len(cors) == 1:
-        lines = _cycle_lines(cors[0])
-    elif cors:
-        lines = [_range_text(cors)]
+        lines += _other_lines(cors[0])
     if truth is not None:
         lines.append(f'truth: beads {truth.beads:g}, walls {truth.walls:g}')
     return [part for line in lines for part in textwrap.wrap(line, _LETTERS)]
 
 
-def _cycle_lines(cor: CorEstimate) -> list[str]:
+def published_text(cors: list[CorEstimate]) -> str:
+    """The published restitutions of a cycle, or of several, and what they come from.
+
+    Parameters
+    ----------
+    cors : list of CorEstimate
+        Final estimates of one cycle or more.
+    """
+    if len(cors) > 1:
+        return _range_text(cors)
+    (cor,) = cors
     walls = ''
     if math.isfinite(cor.wall_restitution.value):
         walls = f', walls {_text(cor.wall_restitution)}'
+    if reason_of(cor) is not None:
+        return f'restitution of beads unknown{walls}'
+    return f'beads {_text(cor.restitution)} (95 %){walls}, {_source(cor)}'
+
+
+def _other_lines(cor: CorEstimate) -> list[str]:
+    """Why a cycle has no restitution, or the others that it has, and what is wrong."""
     reason = reason_of(cor)
     if reason is not None:
-        return [f'analyse: restitution of beads unknown{walls}', f'reason: {reason.text}']
-    lines = [f'analyse: beads {_text(cor.restitution)} (95 %){walls}, {_source(cor)}']
+        return [f'reason: {reason.text}']
+    lines = []
     others = [
         f'{_NAMES[name]} {_text(value)}'
         for name in _ALONE
@@ -139,11 +157,11 @@ def _range_text(cors: list[CorEstimate]) -> str:
     """The published restitutions of several cycles: from the lowest to the highest."""
     known = sorted(cor.restitution.value for cor in cors if reason_of(cor) is None)
     if not known:
-        return f'analyse: restitution of beads unknown in all {len(cors)} cycles'
+        return f'restitution of beads unknown in all {len(cors)} cycles'
     sources = {_source(cor).split(',')[0].split(';')[0] for cor in cors if reason_of(cor) is None}
     named = ', or '.join(sorted(sources))
     return (
-        f'analyse, {len(known)} of {len(cors)} cycles: beads {number(known[0])} to '
+        f'{len(known)} of {len(cors)} cycles: beads {number(known[0])} to '
         f'{number(known[-1])}, median {number(float(np.median(known)))}, {named}'
     )
 

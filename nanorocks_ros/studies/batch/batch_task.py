@@ -24,6 +24,7 @@ from nanorocks_ros.experiment.recorded_experiment import (
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import json_values, read_object
+from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
@@ -227,7 +228,7 @@ def _analysed(task: BagTask) -> BagOutcome:
         'film': analysis.metadata.get('source_sha256', ''),
         'question': task.question,
         'experiment': metadata_of_settings(settings),
-        **_summary(analysis),
+        **_summary(analysis, task.path),
     }
 
     def more(folder: Path) -> None:
@@ -286,10 +287,10 @@ def _noting(note: Path) -> Any:
     return progress
 
 
-def _summary(analysis: Analysis) -> dict[str, Any]:
+def _summary(analysis: Analysis, recording: Path) -> dict[str, Any]:
     error = analysis.error
     return {
-        **as_json(analysis, series=False),
+        **with_recording(as_json(analysis, series=False), recording),
         'notices': [printable(notice) for notice in analysis.notices],
         'state': DONE if error is None else PARTIAL,
         'reason': '' if error is None else printable(str(error)),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.outputs.csv_tables import number, read_csv
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, read_curve
 
@@ -62,23 +62,45 @@ def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
     ------
     RecordingError
         When there is no table, or several and no number to choose one.
+    ConfigurationError
+        When the name has the number of another tray.
     """
+    if not path.exists():
+        raise RecordingError(str(path), 'does not exist', _FORM)
     if not path.is_dir():
         parts = path.stem.split('_')
         has_number = parts[:1] == ['tray'] and len(parts) > 1 and parts[1].isdigit()
-        return path, tray if tray is not None else int(parts[1]) if has_number else None
+        own = int(parts[1]) if has_number else None
+        if own is not None and tray not in (None, own):
+            raise ConfigurationError(
+                '--tray', f'{tray}, but {path.name} is of tray {own}', f'leave out --tray {tray}'
+            )
+        return path, tray if own is None else own
     numbers = sorted(
         int(table.stem.split('_')[1])
         for table in path.glob(_TABLE.format('*'))
         if table.stem.split('_')[1].isdigit()
     )
     if tray is None and len(numbers) != 1:
-        listed = ', '.join(str(table) for table in numbers) or 'none'
-        raise RecordingError(str(path), f'holds speeds of trays: {listed}', 'name one with --tray')
+        raise _no_single_tray(path, numbers)
     number = numbers[0] if tray is None else tray
     if number not in numbers:
         raise RecordingError(str(path), f'holds no speeds of tray {number}', _FORM)
     return path / _TABLE.format(number), number
+
+
+def _no_single_tray(path: Path, numbers: list[int]) -> RecordingError:
+    """The error of a folder with the speeds of no tray, or of several."""
+    if numbers:
+        listed = ', '.join(str(number) for number in numbers)
+        return RecordingError(
+            str(path), f'holds speeds of trays {listed}', f'name one, as --tray {numbers[0]}'
+        )
+    # As by `nanorocks measure` and by batches.
+    below = min((table.parent for table in path.rglob(_TABLE.format('*'))), default=None)
+    return RecordingError(
+        str(path), 'holds no speeds of a tray', _FORM if below is None else f'name {below}'
+    )
 
 
 def read_cycles(path: Path, speed: str = MEAN) -> tuple[CycleSpeeds, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shlex
 import shutil
 from contextlib import suppress
 from pathlib import Path
@@ -130,5 +131,6 @@ def cache_folder(film: Path) -> Path:
     raise RecordingError(
         str(film),
         f'cannot be imported: neither {beside} nor {home} can be written',
-        f'import it yourself: nanorocks import {film} -o BAG',
+        f'import it yourself: nanorocks import {shlex.quote(str(film))} -o '
+        f'{shlex.quote(film.resolve().stem)}',
     )

@@ -16,11 +16,12 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
+from nanorocks_ros.studies.analysis.tray_words import tray_lines
 from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
 from nanorocks_ros.studies.measure.measure_report import write_measure_report
 from nanorocks_ros.studies.measure.measured_folder import TRACKS, prepare_folder, write_measured
-from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ, MeasuredTray
+from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ, DECAY_PREFIX, MeasuredTray
 from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
 from nanorocks_ros.studies.measure.track_contacts import track_contacts
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.progress import Progress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.settings import PipelineSettings
-    from nanorocks_ros.studies.analysis.offline_analysis import Analysis
 
 _TRACKS, _PICTURE = 'tracks.npz', 'tracks.png'
 _MAGNIFICATION = 2
@@ -69,8 +69,8 @@ class MeasurePlan:
     image_topic : str
     workers : Workers
         For the library of decays.
-    describe : callable
-        The cycles of a tray of an analysis in lines.
+    name_files : callable
+        Gives a text whose commands name the recording as the user did.
     """
 
     bag: Path
@@ -79,7 +79,7 @@ class MeasurePlan:
     settings: PipelineSettings
     image_topic: str
     workers: Workers
-    describe: Callable[[Analysis, int], list[str]]
+    name_files: Callable[[str], str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,9 +171,11 @@ def _measured_tray(
     height_known = not math.isnan(tray.dimensions[2])
     known = height_known and (film is None or film.container_known)
     unit = _length_unit(plan)
-    for verdict in tracked.verdicts[number]:
-        for line in verdict.lines():
-            teller.say(line)
+    recognition = [
+        plan.name_files(line) for verdict in tracked.verdicts[number] for line in verdict.lines()
+    ]
+    for line in recognition:
+        teller.say(line)
     speeds = track_speeds(records)
     with teller.progress('contacts') as progress:
         contacts = track_contacts(
@@ -188,7 +190,7 @@ def _measured_tray(
         container_known=known,
         verdicts=tracked.verdicts[number],
     )
-    decay_lines = _decay_lines(plan, step, teller)
+    decay_lines = [plan.name_files(line) for line in _decay_lines(plan, step, teller)]
     for line in decay_lines:
         teller.say(line)
     return MeasuredTray(
@@ -196,9 +198,7 @@ def _measured_tray(
         unit=unit,
         speeds=speeds,
         contacts=contacts,
-        recognition=tuple(
-            line for verdict in tracked.verdicts[number] for line in verdict.lines()
-        ),
+        recognition=tuple(recognition),
         lines=tuple(lines),
         decay=tuple(decay_lines),
     )
@@ -224,8 +224,8 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
         return [f'{DECAY_NOT_READ}; {error}']
     said = {line for verdict in step.verdicts for line in verdict.lines()}
     lines = [
-        f'decay: {line.strip()}'
-        for line in plan.describe(analysis, number)
+        f'{DECAY_PREFIX}{line.strip()}'
+        for line in tray_lines(analysis, analysis.trays[number])
         if line.strip() not in said
     ]
     write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())

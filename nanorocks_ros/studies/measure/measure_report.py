@@ -16,6 +16,7 @@ from nanorocks_ros.outputs.html_report import (
     write_report,
 )
 from nanorocks_ros.outputs.safe_text import counted
+from nanorocks_ros.studies.analysis.published_cycles import published_cycles, published_text
 from nanorocks_ros.studies.measure.measure_figure import measure_figure
 from nanorocks_ros.studies.measure.measure_tables import (
     CONTACTS,
@@ -23,6 +24,7 @@ from nanorocks_ros.studies.measure.measure_tables import (
     RESTITUTIONS,
     tray_tables,
 )
+from nanorocks_ros.studies.measure.measured_tray import DECAY_PREFIX
 from nanorocks_ros.studies.measure.measured_words import restitution_text, restitutions
 
 if TYPE_CHECKING:
@@ -62,26 +64,45 @@ def write_measure_report(
             parts=[
                 *(line for tray in trays for line in tray.recognition),
                 Picture(
-                    path=picture, caption='The last frame: beads in rings, with their last paths'
+                    path=picture,
+                    caption='The last frame: beads in rings, with their last paths',
+                    has_text=False,
                 ),
             ],
         ),
-        *(_tray_section(path.parent, tray, tracked) for tray in trays),
+        *(
+            section
+            for tray in trays
+            for section in (_tray_section(path.parent, tray, tracked), _decay_section(tray))
+        ),
         Section(title='What was said on the way', parts=list(tracked.notices)),
     ]
     made = f'{made_line()} {counted(tracked.frames, "frame")}.'
-    conclusion = _conclusion(trays, usable=tracked.usable)
+    conclusion = _conclusion(path.parent, trays, usable=tracked.usable)
     write_report(path, f'Measured: {film}', conclusion, sections, made)
 
 
-def _conclusion(trays: tuple[MeasuredTray, ...], *, usable: bool) -> str:
-    """Whether the film can be used, and the restitutions of each tray."""
+def _conclusion(folder: Path, trays: tuple[MeasuredTray, ...], *, usable: bool) -> str:
+    """Whether the film can be used, and the restitutions of each tray, the published first."""
     lines = [] if usable else ['NOT USABLE: see the first section.']
     for tray in trays:
+        published = _published(folder, tray)
+        if published:
+            lines.append(f'Tray {tray.number}: {published}.')
         alone = tray.contacts.alone
         beads, walls = (restitution_text(kind, tray.unit) for kind in (alone.beads, alone.walls))
-        lines.append(f'Tray {tray.number}: restitution of two beads {beads}; of walls {walls}.')
-    return ' '.join([*lines, 'By contacts alone, with intervals of 95 %.'])
+        where = 'By contacts alone' if published else f'Tray {tray.number}, by contacts alone'
+        lines.append(f'{where}: two beads {beads}; walls {walls}.')
+    return ' '.join([*lines, 'Brackets are intervals of 95 %.'])
+
+
+def _published(folder: Path, tray: MeasuredTray) -> str:
+    """The restitutions by decay and contacts; '' where the decay was not read."""
+    if not tray.decay_read:
+        return ''
+    name = f'tray_{tray.number}'
+    cors = published_cycles(folder / name / f'{name}_speed.csv', tray.number)
+    return published_text(cors) if cors else ''
 
 
 def _tray_section(folder: Path, tray: MeasuredTray, tracked: TrackedBag) -> Section:
@@ -91,14 +112,18 @@ def _tray_section(folder: Path, tray: MeasuredTray, tracked: TrackedBag) -> Sect
         figure, *(tables[name].values for name in (MEAN_SPEEDS, CONTACTS, RESTITUTIONS))
     )
     return Section(
-        title=f'Tray {tray.number}',
+        title=f'Tray {tray.number}: motion and contacts',
         parts=[
             *tray.lines,
             Picture(path=figure, caption='Speeds of the beads, and contacts'),
             _table(tray),
-            *tray.decay,
         ],
     )
+
+
+def _decay_section(tray: MeasuredTray) -> Section:
+    lines = [line.removeprefix(DECAY_PREFIX) for line in tray.decay]
+    return Section(title=f'Tray {tray.number}: decay of the speeds', parts=list(lines))
 
 
 def _table(tray: MeasuredTray) -> Table:

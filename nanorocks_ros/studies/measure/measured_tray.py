@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.measure.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
 
-DECAY_NOT_READ = 'decay: not read'
+DECAY_PREFIX = 'decay: '
+"""Of the lines that tell of the decay, among others."""
+DECAY_NOT_READ = f'{DECAY_PREFIX}not read'
 """How the line begins that says why the decay is not read."""
 
 

@@ -71,7 +71,7 @@ def test_a_single_cycle_can_be_drawn(tmp_path):
     [
         (('-o', 'a.txt'), 2, 'ends in none of'),
         (('-o', 'a.png', '--first', '5', '--last', '2'), 2, 'two times, rising'),
-        (('-o', 'a.png', '--tray', '9'), 2, 'tray 9'),
+        (('-o', 'a.png', '--tray', '3'), 2, 'is of tray 1; leave out --tray 3'),
         (('-o', 'a.png', '--wall-restitution', '1.2'), 2, 'from 0 to 1'),
         (('-o', 'a.png', '--first', '90', '--last', '99'), 1, 'in common'),
     ],

@@ -103,6 +103,44 @@ def test_a_wrong_call_is_one_line_with_what_to_do(capsys, words, line):
     assert capsys.readouterr().err == f'nanorocks: {line}\n'
 
 
+@pytest.mark.parametrize(
+    'words',
+    [
+        ['measure', '-o', 'out', '--diameter-px', '27', 'my film.mp4'],
+        ['calibrate', '--trays', '1', 'my film.mp4'],
+        ['analyse', '--trays', '1', 'my film.mp4'],
+    ],
+)
+def test_a_film_behind_numbers_is_told_to_stand_before_them(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'my film.mp4').touch()
+    (tmp_path / 'out').mkdir()
+    try:
+        code = main(words)
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    assert capsys.readouterr().err.endswith("; write 'my film.mp4' before the options\n")
+
+
+def test_a_folder_for_results_is_not_taken_for_a_film(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'out').mkdir()
+    with pytest.raises(SystemExit):
+        main(['measure', '-o', 'out'])
+    error = capsys.readouterr().err
+    assert error == (
+        'nanorocks: the following arguments are required: BAG; see nanorocks measure --help\n'
+    )
+
+
+@pytest.mark.parametrize('name', PARSERS)
+def test_a_help_begins_with_a_sentence(name):
+    description = PARSERS[name].description or ''
+    assert description[:1].isupper()
+    assert description.endswith('.')
+
+
 def test_a_misspelt_value_of_a_setting_has_a_hint(capsys):
     assert main(['simulate', '--sticking-measure', 'nromal']) == 2
     assert 'is none of normal, total, did you mean normal?' in capsys.readouterr().err

@@ -72,11 +72,12 @@ def test_numbers_of_a_setting_are_separated_by_spaces_or_commas():
 
 
 @pytest.mark.parametrize('command', ['measure', 'analyse', 'track'])
-def test_tray_is_accepted_for_both_where_a_recording_is_processed(command):
+def test_tray_is_accepted_for_both_where_a_recording_is_processed(command, capsys):
     words = [command, 'a', *(['-o', 'out'] if command == 'measure' else [])]
     options = build_parser().parse_args([*words, '--tray', 'mine.yaml', '--tray', '3'])
     assert (options.trays_file, options.trays) == ('mine.yaml', ['3'])
     assert '--tray ' not in PARSERS[f'nanorocks {command}'].format_full_help()
+    assert 'use --trays-file mine.yaml' in capsys.readouterr().err
 
 
 def test_the_tray_of_a_cluster_curve_is_accepted_as_one_of_its_trays():

@@ -92,7 +92,7 @@ def test_every_flag_has_words_and_a_remedy():
 def test_a_cycle_is_said_with_what_it_rests_on():
     text = text_of(FINAL, CLUSTERS)
     assert 'COR 0.8912 [0.8801, 0.9011], walls 0.971 [0.966, 0.976]' in text
-    assert 'v0 3.10 mm/s, tau 8.50 s' in text
+    assert "Haff's law: v0 3.10 +- 0.10 mm/s, tau 8.50 +- 0.40 s" in text
     assert '180 speeds from 1.8 to 20.0 s' in text
     assert '20 rebounds, 31 collisions' in text
     assert '0.7 standard deviations' in text

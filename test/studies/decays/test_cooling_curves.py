@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from decays import simulated_table, write_rows
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.table_columns import float_columns
 from nanorocks_ros.records import (
@@ -83,15 +83,27 @@ def test_the_table_of_a_folder_is_found_by_its_tray(tmp_path):
     for number in (1, 3):
         write_rows(tmp_path / f'tray_{number}_speed.csv', cycle(1, 0.0))
     assert speed_table(tmp_path, 3) == (tmp_path / 'tray_3_speed.csv', 3)
-    with pytest.raises(RecordingError, match='holds speeds of trays: 1, 3; name one'):
+    with pytest.raises(RecordingError, match='holds speeds of trays 1, 3; name one, as --tray 1'):
         speed_table(tmp_path)
     with pytest.raises(RecordingError, match='no speeds of tray 5'):
         speed_table(tmp_path, 5)
 
 
 def test_a_folder_without_speeds_is_named(tmp_path):
-    with pytest.raises(RecordingError, match='trays: none'):
+    with pytest.raises(RecordingError, match='holds no speeds of a tray; name the results'):
         speed_table(tmp_path)
+    below = tmp_path / 'tray_1'
+    below.mkdir()
+    write_rows(below / 'tray_1_speed.csv', cycle(1, 0.0))
+    with pytest.raises(RecordingError, match=f'name {below}'):
+        speed_table(tmp_path)
+
+
+def test_a_table_is_not_taken_for_another_tray_than_its_name_says(tmp_path):
+    table = write_rows(tmp_path / 'tray_1_speed.csv', cycle(1, 0.0))
+    assert speed_table(table) == speed_table(table, 1) == (table, 1)
+    with pytest.raises(ConfigurationError, match='is of tray 1; leave out --tray 3'):
+        speed_table(table, 3)
 
 
 def test_a_decay_is_read_from_a_table_of_cycles_or_of_one_curve(tmp_path):

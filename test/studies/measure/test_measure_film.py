@@ -83,7 +83,7 @@ def test_a_bouncing_ball_gives_the_restitution_of_the_floor_from_its_diameter_al
 def test_the_page_and_the_tables_hold_the_results(measured):
     folder, _ = measured
     page = (folder / 'report.html').read_text()
-    for part in ('usable', 'floor', 'px/s^2', 'data:image/png'):
+    for part in ('usable', 'floor', 'px/s²', 'data:image/png'):
         assert part in page
     header = (folder / 'tracks.csv').read_text().splitlines()[0]
     assert 'x_px' in header
