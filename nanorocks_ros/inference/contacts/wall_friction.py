@@ -61,6 +61,9 @@ def friction_table(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
         ]
     ).T  # fmt: skip
     loss = (np.sign(before) * (before - after) / error)[:, np.newaxis]
+    # A correction for drag may take a recorded rebound across the cut. There the density of a
+    # large friction would grow without limit, and one rebound decide.
+    loss = np.clip(loss, -TANGENTIAL_SIGMAS, TANGENTIAL_SIGMAS)
     expected = FRICTIONS * (change / error)[:, np.newaxis]
     by_scale = []
     for scale in ERROR_SCALES:

@@ -56,6 +56,16 @@ def test_sliding_beads_give_the_friction_though_large_losses_are_not_recorded(fr
     assert np.median(errors) < 0.012
 
 
+def test_a_rebound_that_drag_takes_across_the_cut_does_not_decide():
+    rebounds = sliding(np.random.default_rng(3), 16, 0.02)
+    first = rebounds[0]
+    loss = math.copysign(1.8 * TANGENTIAL_SIGMAS * ERROR, first.tangential_incoming)
+    beyond = replace(first, tangential_outgoing=first.tangential_incoming - loss)
+    without = wall_friction(friction_table(rebounds[1:]))
+    estimate = wall_friction(friction_table([beyond, *rebounds[1:]]))
+    assert abs(estimate.value - without.value) < 2.0 * without.error
+
+
 def test_without_rebounds_nothing_is_known_of_the_friction():
     assert not ContactTerms.of(()).wall_friction.known
 
