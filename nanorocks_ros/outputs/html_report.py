@@ -27,6 +27,10 @@ _LONGEST_NUMBER = 40
 _LETTERS = {' +- ': ' ± ', '/s^2': '/s²', ' um/': ' µm/'}
 
 
+NOT_KNOWN = '–'
+"""What stands in a table for a number that is not known."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
     """A table; cells are text.
@@ -193,7 +197,7 @@ def _picture(picture: Picture) -> str:
 def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
     """A number for a cell of a table; a dash where it is not known."""
     if value is None or not math.isfinite(value):
-        return '–'
+        return NOT_KNOWN
     text = f'{factor * value:.{digits}g}'
     return f'{float(text):.0f}' if 'e+' in text else text
 
@@ -204,7 +208,7 @@ def with_interval(value: float, interval: tuple[float, float], factor: float = 1
     A dash where the number is not known.
     """
     if not math.isfinite(value):
-        return '–'
+        return NOT_KNOWN
     lower, upper = (factor * end for end in interval)
     decimals = _decimals(0.25 * (upper - lower)) if upper > lower else 3
     return f'{factor * value:.{decimals}f} [{lower:.{decimals}f}, {upper:.{decimals}f}]'
@@ -224,7 +228,7 @@ def with_error(value: float, error: float, factor: float = 1.0) -> str:
     """
     value, error = factor * value, factor * error
     if not math.isfinite(value):
-        return '–'
+        return NOT_KNOWN
     if not error > 0.0 or math.isinf(error):
         return number(value, 3 if error == 0.0 else 2)
     decimals = _decimals(max(error, 0.01 * abs(value)))

@@ -92,7 +92,7 @@ def cluster_chapter(context: Context) -> Chapter:
             differences.append(Difference(quantity, '', '', size, true_size))
         if number == _SHOWN:
             findings.append(
-                f'In tray {_SHOWN} {shares[0]} % of the beads are in clusters at the end of the '
+                f'In tray {_SHOWN}, {shares[0]} % of the beads are in clusters at the end of the '
                 f'cycles with sticking by our tracks, where {shares[1]} % is true.'
             )
     section.parts += [

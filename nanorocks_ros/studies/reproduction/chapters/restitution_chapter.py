@@ -13,7 +13,14 @@ from nanorocks_ros.experiment import paper_values as reported
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.instantaneous_restitution import InstantaneousCor
 from nanorocks_ros.numerics.sample_mean import mean_of
-from nanorocks_ros.outputs.html_report import Erratum, Picture, Section, Table, with_interval
+from nanorocks_ros.outputs.html_report import (
+    NOT_KNOWN,
+    Erratum,
+    Picture,
+    Section,
+    Table,
+    with_interval,
+)
 from nanorocks_ros.physics.confined_theory import confined_gas
 from nanorocks_ros.physics.paper_formulas import (
     paper_restitution,
@@ -71,7 +78,8 @@ def restitution_chapter(context: Context) -> Chapter:
     first = differences[0]
     finding = (
         f'From films of beads of {first.truth} the closed form of the paper gives '
-        f'{first.its_method} in tray 1, our estimate is {first.ours}.'
+        f'{first.its_method} in tray 1, our estimate is '
+        f'{"not known" if first.ours == NOT_KNOWN else first.ours}.'
     )
     section.parts += [
         _energy_part(context),
@@ -248,7 +256,7 @@ def _by_calibrated_area(context: Context, tray: Tray) -> list[float]:
 def _with_interval(cycles: Sequence[dict[str, Any]], name: str) -> str:
     """Mean value and mean ends of the intervals, as text."""
     if not cycles:
-        return '–'
+        return NOT_KNOWN
     value, lower, upper = (
         mean_of([cycle.get(name + suffix) for cycle in cycles])[0]
         for suffix in ('', '_lower', '_upper')

@@ -74,7 +74,7 @@ def rotation_chapter(context: Context) -> Chapter:
         '',
     )
     finding = (
-        f'Equipartition at 1 mm/s is a spin of {number(spins[0], 2)} degrees/s, not '
+        f'Equipartition at 1 mm/s is a spin of {number(spins[0])} degrees/s, not '
         f'{PAPER_ROTATION:g}.'
     )
     return Chapter(section=section, differences=[row], findings=[finding])
