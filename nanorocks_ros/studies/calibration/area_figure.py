@@ -50,10 +50,11 @@ def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
 
 def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
     area_speed = _MM * np.array([pair.area_speed for pair in fit.pairs])
+    area_error = _MM * np.array([pair.area_speed_error for pair in fit.pairs])
     axes.errorbar(
         area_speed,
         [_MM * pair.manual_speed for pair in fit.pairs],
-        xerr=[_MM * pair.area_speed_error for pair in fit.pairs],
+        xerr=area_error,
         yerr=[_MM * pair.manual_speed_error for pair in fit.pairs],
         fmt='o',
         ms=4,
@@ -61,9 +62,11 @@ def _draw(axes: Axes, number: int, fit: AreaFit) -> None:
         color=MEASURED,
         label=f'{fit.windows} windows',
     )
-    max_speed = float(area_speed.max()) * 1.1
+    max_speed = 1.05 * float((area_speed + area_error).max())
     line = np.array([0.0, max_speed])
-    offset = f' {_MM * fit.offset:+.2f} mm/s' if math.isfinite(fit.offset_error) else ''
+    sign = '−' if fit.offset < 0.0 else '+'
+    is_fitted = math.isfinite(fit.offset_error)
+    offset = f' {sign} {_MM * abs(fit.offset):.2f} mm/s' if is_fitted else ''
     axes.plot(
         line,
         fit.factor * line + _MM * fit.offset,
