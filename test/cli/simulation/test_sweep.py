@@ -160,7 +160,7 @@ def test_unusable_files_are_named(tmp_path, capsys):
     assert 'a.npz: exists and holds no sweep; delete it' in capsys.readouterr().err
     missing = ['--figure', 'a.png', '--reference', str(tmp_path / 'no.csv')]
     assert main(['sweep', *SMALL, *GRID, '-o', str(tmp_path / 'b.npz'), *missing]) == 1
-    assert 'no.csv: cannot be read (No such file or directory)' in capsys.readouterr().err
+    assert 'no.csv: does not exist' in capsys.readouterr().err
 
 
 def test_ctrl_c_keeps_finished_runs_and_the_same_command_resumes(tmp_path):

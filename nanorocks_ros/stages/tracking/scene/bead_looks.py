@@ -1,4 +1,7 @@
-"""What is told of beads, where they are searched, and the discs that a frame shows."""
+"""What is told of beads, where they are searched, and the discs that a frame shows.
+
+Tested by ``test/stages/tracking/scene/test_scene_detector.py``.
+"""
 
 from __future__ import annotations
 
