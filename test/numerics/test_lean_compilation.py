@@ -119,6 +119,9 @@ def test_a_function_compiled_by_numba_calls_one_of_this_package():
         doubled(-3)
 
 
+@pytest.mark.skipif(
+    numba.version_info.short < (0, 60), reason='LLVM of numba 0.59 does not vectorise this loop'
+)
 def test_loops_are_vectorised():
     gray = np.arange(100, dtype=np.uint8).reshape(10, 10)
     color, shares = np.repeat(gray[:, :, np.newaxis], 3, axis=2), np.empty_like(gray)
