@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.html_report import (
+    NOT_KNOWN,
     Picture,
     Section,
     Table,
@@ -164,7 +165,7 @@ def _together(tray: TrayMeans) -> tuple[str, ...]:
         str(tray.tray),
         str(values['cycles_read']),
         str(values['decays_left_out']),
-        values['headline'] or '–',
+        values['headline'] or NOT_KNOWN,
         interval_cell(values, 'restitution'),
         interval_cell(values, 'wall_restitution'),
         str(values['rebounds']),
@@ -186,7 +187,7 @@ def _clusters(together: Combined) -> Section:
                 str(tray.tray),
                 interval_cell(values, 'sticking_speed', _MM),
                 status,
-                '–' if merges is None else str(merges),
+                NOT_KNOWN if merges is None else str(merges),
                 mean_cell(tray, 'cluster_size', _MM if in_mm else 1.0),
                 mean_cell(tray, 'bodies'),
                 mean_cell(tray, 'onset'),

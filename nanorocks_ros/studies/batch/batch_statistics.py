@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.outputs.html_report import Picture, Section, Table, with_error
+from nanorocks_ros.outputs.html_report import NOT_KNOWN, Picture, Section, Table, with_error
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.records import Tracks
@@ -170,7 +170,7 @@ def _cell(recordings: Sequence[Mapping[str, Any]], name: str, theory: str, facto
         if values.get(name) is not None and values.get(f'{name}_error')
     ]
     if not known:
-        return '–'
+        return NOT_KNOWN
     weights = [error**-2 for _, error in known]
     mean = sum(weight * value for weight, (value, _) in zip(weights, known, strict=True))
     text = with_error(mean / sum(weights), sum(weights) ** -0.5, factor)

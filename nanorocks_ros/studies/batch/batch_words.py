@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.outputs.html_report import number, with_error, with_interval
+from nanorocks_ros.outputs.html_report import NOT_KNOWN, number, with_error, with_interval
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.batch.campaign_means import means_as_json
 
@@ -39,7 +39,7 @@ def conclusions(together: Combined) -> list[str]:
         lines.append(
             f'Tray {tray.tray}: restitution of the beads {beads}, of the walls {walls}, from '
             f'{counted(tray.cycles, "cycle")}{source}.'
-            if beads != '–'
+            if beads != NOT_KNOWN
             else f'Tray {tray.tray}: no restitution from {counted(tray.cycles, "cycle")}.'
         )
     return [*lines, 'Brackets are intervals of 95 %.']
@@ -49,7 +49,7 @@ def interval_cell(values: dict[str, Any], name: str, factor: float = 1.0) -> str
     """A value with its interval, or what is known of it."""
     middle, low, high = (values.get(f'{name}{end}') for end in ('', '_lower', '_upper'))
     if low is None or high is None:
-        return '–' if low is None and high is None else _one_sided(low, high, factor)
+        return NOT_KNOWN if low is None and high is None else _one_sided(low, high, factor)
     if middle is None:
         return f'{number(low, 3, factor)} to {number(high, 3, factor)}'
     return with_interval(middle, (low, high), factor)
@@ -65,7 +65,7 @@ def mean_cell(tray: TrayMeans, name: str, factor: float = 1.0) -> str:
     """A mean over cycles ± the scatter of one, with the number of cycles in brackets."""
     mean = tray.means[name]
     if not mean.cycles:
-        return '–'
+        return NOT_KNOWN
     if mean.cycles == 1:
         return f'{number(mean.mean, 3, factor)} (1)'
     return f'{with_error(mean.mean, mean.scatter, factor)} ({mean.cycles})'
@@ -75,5 +75,5 @@ def measured_cell(values: dict[str, Any], name: str, factor: float = 1.0) -> str
     """A value of one cycle with its standard error."""
     value, error = values[name], values.get(f'{name}_error')
     if value is None:
-        return '–'
+        return NOT_KNOWN
     return with_error(value, math.nan if error is None else error, factor)

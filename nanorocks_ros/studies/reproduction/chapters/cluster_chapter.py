@@ -16,6 +16,7 @@ from nanorocks_ros.numerics.sample_mean import mean_of
 from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import MAP, TWO_COLUMNS, scale_bar
 from nanorocks_ros.outputs.html_report import (
+    NOT_KNOWN,
     Erratum,
     Picture,
     Section,
@@ -191,7 +192,7 @@ def _table_3_cells(ends: Sequence[ClusterEnd]) -> tuple[str, str, str]:
     deviation = float(np.abs(each - each.mean()).mean()) if each.size > 1 else math.nan
     return (
         _with_own_error([end.clusters for end in ends], [end.clusters_error for end in ends]),
-        with_error(float(each.mean()), deviation) if each.size else '–',
+        with_error(float(each.mean()), deviation) if each.size else NOT_KNOWN,
         _with_own_error([end.share for end in ends], [end.share_error for end in ends], 100.0),
     )
 

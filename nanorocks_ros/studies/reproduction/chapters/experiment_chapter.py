@@ -15,7 +15,7 @@ from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.paper_values import PAPER_TRACKED
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.outputs.html_report import Picture, Section, Table
+from nanorocks_ros.outputs.html_report import NOT_KNOWN, Picture, Section, Table
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
@@ -133,7 +133,7 @@ def _mean_and_deviation(shares: Sequence[float]) -> str:
     """Mean and mean absolute deviation of the known shares, [%]."""
     known = 100.0 * np.array([share for share in shares if np.isfinite(share)])
     if not known.size:
-        return '–'
+        return NOT_KNOWN
     mean = float(known.mean())
     deviation = f' ± {float(np.abs(known - mean).mean()):.1f}' if known.size > 1 else ''
     return f'{mean:.1f}{deviation}'
