@@ -92,6 +92,8 @@ class CrowdedStructureFunction(StructureFunction):
     crowd : CrowdedGrains
     """
 
+    _pairs_kept = 400
+
     def __init__(
         self, settings: SpeedSettings, diameter_px: float, beads: int, crowd: CrowdedGrains
     ) -> None:

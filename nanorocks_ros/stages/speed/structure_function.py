@@ -44,7 +44,6 @@ _SHIFT_ERROR = 0.5
 # Share of the plateau beyond which a displacement is not reliable: a sixth of the simulated
 # estimates were off by more than 20 %.
 _OUT_OF_RANGE = 0.65
-_PAIRS_KEPT = 400
 _KEY_INTERVAL_NS = NS // 4
 _KEYS_KEPT = 48
 
@@ -97,6 +96,10 @@ class StructureFunction:
     layers : float, >= 0
         Number of grains above one another, where they hide each other; 0 where they do not.
     """
+
+    # Pairs of images from which the calibration is learnt: the first ones, from the fast gas. Of
+    # slow beads in crowds many keep their places, and the plateau seems lower.
+    _pairs_kept = 24
 
     def __init__(
         self,
@@ -172,13 +175,41 @@ class StructureFunction:
             self._next_sample_ns += round(self._settings.interval * NS)
             self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
             sample = self._sample(cycle, noise_power, self._centred)
-        if self._response.pairs >= _PAIRS_KEPT:
-            # The calibration is complete.
+        if self.calibrated:
             self._keys.clear()
         elif not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
             self._learn(stamp_ns, gray, noise_power)
             self._keep_key(stamp_ns, gray)
         return sample
+
+    def learn(
+        self,
+        later: NDArray[np.uint8],
+        earlier: NDArray[np.uint8],
+        noise_power: float,
+        path_px: float,
+    ) -> None:
+        """Learn the look of the beads from two images with a path of them that is known.
+
+        Parameters
+        ----------
+        later, earlier : ndarray of uint8, (rows, columns)
+        noise_power : float, [gray levels^2]
+            Mean squared difference per pixel of a scene at rest.
+        path_px : float, [px]
+            Mean path of the beads, at least `unrelated_px`.
+        """
+        self._response.add(later, earlier, noise_power, self._displacement_of(path_px))
+
+    @property
+    def unrelated_px(self) -> float:
+        """Mean path of the beads after which two images are unrelated, [px]."""
+        return self._unrelated_px
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether nothing more is to be learnt."""
+        return self._response.pairs >= self._pairs_kept
 
     @property
     def ready(self) -> bool:
