@@ -14,7 +14,8 @@ from nanorocks_ros.stages.speed.crowded_structure_function import (
     CrowdedGrains,
     CrowdedStructureFunction,
 )
-from nanorocks_ros.stages.speed.structure_function import Sample, StructureFunction
+from nanorocks_ros.stages.speed.structure_function import StructureFunction
+from nanorocks_ros.stages.speed.structure_samples import Sample
 from nanorocks_ros.stages.speed.unrelated_pairs import UnrelatedPairs
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +19,7 @@ import numpy as np
 from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.shaking.difference_noise import difference_power
 from nanorocks_ros.stages.speed.structure_calibration import StructureCalibration
+from nanorocks_ros.stages.speed.structure_samples import ImagePair, Sample, lag_ladder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,38 +46,6 @@ _SHIFT_ERROR = 0.5
 _OUT_OF_RANGE = 0.65
 _KEY_INTERVAL_NS = NS // 4
 _KEYS_KEPT = 48
-
-# A later and an earlier image, each with its stamp.
-ImagePair = tuple[tuple[int, 'NDArray[np.uint8]'], tuple[int, 'NDArray[np.uint8]']]
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """Structure function at every lag, at one instant.
-
-    Parameters
-    ----------
-    cycle : int
-    cycle_start_ns : int or None, [ns]
-    noise_power : float, [gray levels^2]
-    middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
-        Middle and length of the time between the two images.
-    shifts_px : ndarray (n_lags,), [px]
-        How far the tray moved past the beads in the images between them.
-    tray_px : ndarray (n_lags,), [px]
-        How far the tray moved past the camera.
-    powers : ndarray (n_lags,), [gray levels^2]
-        Sums over the image, free of noise.
-    """
-
-    cycle: int
-    cycle_start_ns: int | None
-    noise_power: float
-    middles_ns: NDArray[np.int64]
-    windows_ns: NDArray[np.int64]
-    shifts_px: NDArray[np.float64]
-    tray_px: NDArray[np.float64]
-    powers: NDArray[np.float64]
 
 
 class StructureFunction:
@@ -115,7 +83,7 @@ class StructureFunction:
         self._layers = layers
         self._centred = centred
         self._diameter_px = diameter_px
-        self._lags = _ladder(settings.max_lag_frames)
+        self._lags = lag_ladder(settings.max_lag_frames)
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
             maxlen=settings.max_lag_frames + 1
         )
@@ -339,11 +307,3 @@ class StructureFunction:
             step = pixels * (stamp_ns - self._path_stamps[-1]) / float(sample.windows_ns[lag])
         self._path_stamps.append(stamp_ns)
         self._path.append(self._path[-1] + step)
-
-
-def _ladder(longest: int) -> tuple[int, ...]:
-    """Lags that grow by about a third each, from one frame to the longest."""
-    lags = [1]
-    while lags[-1] < longest:
-        lags.append(min(longest, max(lags[-1] + 1, (4 * lags[-1] + 1) // 3)))
-    return tuple(lags)
