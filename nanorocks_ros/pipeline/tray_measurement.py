@@ -197,8 +197,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:
             return self._structure_speed.push(self._selector.flagged(image))
-        if self._selector.watches_noise:
-            self._structure_speed.watch_noise(image)
+        if self._selector.watches_images:
+            self._structure_speed.watch(image, self._track_speed.last_in(image.cycle))
         self._structure_speed.pause()
         return ()
 

@@ -29,6 +29,7 @@ from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.speed.structure_speed import StructureSpeed
 
 NS = 1e9
 TRAY = load_trays()[1]
@@ -294,6 +295,28 @@ def test_tracks_are_relied_upon_where_nearly_all_beads_are_followed(run):
     speeds = pushed(run[0], 'auto')
     assert {record.method for record in speeds} == {SpeedMethod.TRACKING}
     assert not any(record.quality & Quality.FEW_BEADS for record in speeds)
+
+
+def test_the_look_of_the_beads_is_learnt_while_tracks_measure(run):
+    images = run[0]
+    stage = StructureSpeed(PipelineSettings(), TRAY)
+    tracked = TrayMeasurement(PipelineSettings(), TRAY)
+    last, start, estimates = None, 240, []
+    for image in images[:start]:
+        for speed in measured(tracked, [image], SpeedEstimate):
+            last = speed if speed.cycle > 0 else None
+        stage.watch(replace(image, cycle=1), last)
+        stage.pause()
+    for image in images[start:]:
+        estimates += stage.push(replace(image, cycle=1))
+    # Who learns only from now on has no speed for seconds, and they are not those of a fast gas.
+    afresh = StructureSpeed(PipelineSettings(), TRAY)
+    first = images[start + 20]
+    assert not [speed for image in images[start : start + 20] for speed in afresh.push(image)]
+    early = [speed for speed in estimates if speed.stamp_ns < first.stamp_ns]
+    assert early
+    values = ratios(early, run[1])
+    assert np.abs(values[:, 0] / values[:, 2] - 1.0).max() < 0.15
 
 
 def test_images_are_not_kept_for_a_method_that_is_not_used(run):

@@ -25,7 +25,8 @@ from nanorocks_ros.physics.crowded_grains import (
 )
 from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.shaking.difference_noise import difference_power
-from nanorocks_ros.stages.speed.structure_function import ImagePair, Sample, StructureFunction
+from nanorocks_ros.stages.speed.structure_function import StructureFunction
+from nanorocks_ros.stages.speed.structure_samples import ImagePair, Sample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -91,6 +92,8 @@ class CrowdedStructureFunction(StructureFunction):
     beads : int
     crowd : CrowdedGrains
     """
+
+    _pairs_kept = 400
 
     def __init__(
         self, settings: SpeedSettings, diameter_px: float, beads: int, crowd: CrowdedGrains

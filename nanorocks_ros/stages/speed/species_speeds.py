@@ -14,7 +14,9 @@ from nanorocks_ros.stages.speed.crowded_structure_function import (
     CrowdedGrains,
     CrowdedStructureFunction,
 )
-from nanorocks_ros.stages.speed.structure_function import Sample, StructureFunction
+from nanorocks_ros.stages.speed.structure_function import StructureFunction
+from nanorocks_ros.stages.speed.structure_samples import Sample
+from nanorocks_ros.stages.speed.unrelated_pairs import UnrelatedPairs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -95,6 +97,27 @@ class SpeciesSpeeds:
         """Forget the images from before a shaking event, all but the last."""
         for part in self._parts:
             part.shaken()
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether nothing more is to be learnt of the look of the beads."""
+        return all(part.calibrated for part in self._parts)
+
+    def unrelated_pairs(self) -> list[UnrelatedPairs]:
+        """For each species, what keeps images until two of them are unrelated."""
+        return [UnrelatedPairs(part.unrelated_px) for part in self._parts]
+
+    def learn(
+        self,
+        pairs: Sequence[UnrelatedPairs],
+        images: Sequence[NDArray[np.uint8]],
+        noise_powers: Sequence[float],
+    ) -> None:
+        """Learn the look of the beads from images of each species, whose paths the pairs know."""
+        for part, kept, image, noise in zip(self._parts, pairs, images, noise_powers, strict=True):
+            pair = kept.push(image)
+            if pair is not None:
+                part.learn(image, pair[0], noise, pair[1])
 
     def push(
         self,

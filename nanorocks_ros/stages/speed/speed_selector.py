@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.records import Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
+from nanorocks_ros.stages.tracking.bead_distances import HIDDEN_ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -58,7 +60,7 @@ class SpeedSelector:
         return self._method == 'structure_function' or (self._auto and not self._tracks.reliable)
 
     @property
-    def watches_noise(self) -> bool:
+    def watches_images(self) -> bool:
         """Whether the structure function may be needed later, while it is not used."""
         return self._auto
 
@@ -90,8 +92,10 @@ class SpeedSelector:
         for speed in speeds:
             if speed.method is SpeedMethod.TRACKING:
                 from_tracks.append(speed)
-            elif speed.method is SpeedMethod.BINARISED_AREA or structure_counts:
+            elif speed.method is SpeedMethod.BINARISED_AREA:
                 chosen.append(speed)
+            elif structure_counts:
+                chosen.append(self._with_hidden_beads(speed))
         chosen += self._from_tracks(from_tracks)
         return tuple(_flag_uncertain(speed) for speed in chosen if self._in_order(speed))
 
@@ -108,6 +112,20 @@ class SpeedSelector:
             return []
         held, self._held = self._held, []
         return held if self._tracks.reliable else []
+
+    def _with_hidden_beads(self, speed: SpeedEstimate) -> SpeedEstimate:
+        """A speed from images, with the error of those beads that lie under others, and are slow.
+
+        With a method that is set nothing is known of them.
+        """
+        relative = HIDDEN_ERROR * self._tracks.hidden if self._auto else 0.0
+        if not relative:
+            return speed
+        mean, *species = (
+            Measured(each.value, math.hypot(each.error, relative * each.value))
+            for each in (speed.mean_projected_speed, *speed.species_speeds)
+        )
+        return replace(speed, mean_projected_speed=mean, species_speeds=tuple(species))
 
     def _in_order(self, speed: SpeedEstimate) -> bool:
         """Whether a speed is later than the last one, which another method may have given."""

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +19,7 @@ import numpy as np
 from nanorocks_ros.records import NS
 from nanorocks_ros.stages.preprocess.shaking.difference_noise import difference_power
 from nanorocks_ros.stages.speed.structure_calibration import StructureCalibration
+from nanorocks_ros.stages.speed.structure_samples import ImagePair, Sample, lag_ladder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,41 +44,8 @@ _SHIFT_ERROR = 0.5
 # Share of the plateau beyond which a displacement is not reliable: a sixth of the simulated
 # estimates were off by more than 20 %.
 _OUT_OF_RANGE = 0.65
-_PAIRS_KEPT = 400
 _KEY_INTERVAL_NS = NS // 4
 _KEYS_KEPT = 48
-
-# A later and an earlier image, each with its stamp.
-ImagePair = tuple[tuple[int, 'NDArray[np.uint8]'], tuple[int, 'NDArray[np.uint8]']]
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """Structure function at every lag, at one instant.
-
-    Parameters
-    ----------
-    cycle : int
-    cycle_start_ns : int or None, [ns]
-    noise_power : float, [gray levels^2]
-    middles_ns, windows_ns : ndarray of int64, (n_lags,), [ns]
-        Middle and length of the time between the two images.
-    shifts_px : ndarray (n_lags,), [px]
-        How far the tray moved past the beads in the images between them.
-    tray_px : ndarray (n_lags,), [px]
-        How far the tray moved past the camera.
-    powers : ndarray (n_lags,), [gray levels^2]
-        Sums over the image, free of noise.
-    """
-
-    cycle: int
-    cycle_start_ns: int | None
-    noise_power: float
-    middles_ns: NDArray[np.int64]
-    windows_ns: NDArray[np.int64]
-    shifts_px: NDArray[np.float64]
-    tray_px: NDArray[np.float64]
-    powers: NDArray[np.float64]
 
 
 class StructureFunction:
@@ -98,6 +65,10 @@ class StructureFunction:
         Number of grains above one another, where they hide each other; 0 where they do not.
     """
 
+    # Pairs of images from which the calibration is learnt: the first ones, from the fast gas. Of
+    # slow beads in crowds many keep their places, and the plateau seems lower.
+    _pairs_kept = 24
+
     def __init__(
         self,
         settings: SpeedSettings,
@@ -112,7 +83,7 @@ class StructureFunction:
         self._layers = layers
         self._centred = centred
         self._diameter_px = diameter_px
-        self._lags = _ladder(settings.max_lag_frames)
+        self._lags = lag_ladder(settings.max_lag_frames)
         self._images: deque[tuple[int, NDArray[np.uint8]]] = deque(
             maxlen=settings.max_lag_frames + 1
         )
@@ -172,13 +143,41 @@ class StructureFunction:
             self._next_sample_ns += round(self._settings.interval * NS)
             self._next_sample_ns = max(self._next_sample_ns, stamp_ns + 1)
             sample = self._sample(cycle, noise_power, self._centred)
-        if self._response.pairs >= _PAIRS_KEPT:
-            # The calibration is complete.
+        if self.calibrated:
             self._keys.clear()
         elif not self._keys or stamp_ns - self._keys[-1][0] >= self._key_interval_ns:
             self._learn(stamp_ns, gray, noise_power)
             self._keep_key(stamp_ns, gray)
         return sample
+
+    def learn(
+        self,
+        later: NDArray[np.uint8],
+        earlier: NDArray[np.uint8],
+        noise_power: float,
+        path_px: float,
+    ) -> None:
+        """Learn the look of the beads from two images with a path of them that is known.
+
+        Parameters
+        ----------
+        later, earlier : ndarray of uint8, (rows, columns)
+        noise_power : float, [gray levels^2]
+            Mean squared difference per pixel of a scene at rest.
+        path_px : float, [px]
+            Mean path of the beads, at least `unrelated_px`.
+        """
+        self._response.add(later, earlier, noise_power, self._displacement_of(path_px))
+
+    @property
+    def unrelated_px(self) -> float:
+        """Mean path of the beads after which two images are unrelated, [px]."""
+        return self._unrelated_px
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether nothing more is to be learnt."""
+        return self._response.pairs >= self._pairs_kept
 
     @property
     def ready(self) -> bool:
@@ -308,11 +307,3 @@ class StructureFunction:
             step = pixels * (stamp_ns - self._path_stamps[-1]) / float(sample.windows_ns[lag])
         self._path_stamps.append(stamp_ns)
         self._path.append(self._path[-1] + step)
-
-
-def _ladder(longest: int) -> tuple[int, ...]:
-    """Lags that grow by about a third each, from one frame to the longest."""
-    lags = [1]
-    while lags[-1] < longest:
-        lags.append(min(longest, max(lags[-1] + 1, (4 * lags[-1] + 1) // 3)))
-    return tuple(lags)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from nanorocks_ros.records import NS, Measured, Quality, SpeedEstimate, SpeedMethod, TrayImage
 from nanorocks_ros.stages.preprocess.shaking.difference_noise import NoiseMeter
 from nanorocks_ros.stages.speed.crowded_structure_function import CrowdedGrains
@@ -15,11 +17,13 @@ from nanorocks_ros.stages.speed.species_images import SpeciesImages
 from nanorocks_ros.stages.speed.species_speeds import PictureSpeed, SpeciesSpeeds
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.stages.speed.unrelated_pairs import UnrelatedPairs
 
 # Relative error of the mean speed of a mixture measured as one species: fast light beads count too
 # little.
@@ -69,7 +73,10 @@ class StructureSpeed:
         self._separated = False
         self._waited = 0
         self._noise: list[NoiseMeter] = []
+        self._noise_powers: list[float] = []
         self._speeds: SpeciesSpeeds | None = None
+        self._pairs: list[UnrelatedPairs] = []
+        self._watched_ns: int | None = None
 
     def push(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         """Take the next image, whose cycle is known.
@@ -102,16 +109,50 @@ class StructureSpeed:
             self._speeds.shaken()
         self._idle = True
 
-    def watch_noise(self, image: TrayImage) -> None:
-        """Measure only the noise of an image, for when another method fails."""
+    def watch(self, image: TrayImage, tracked: SpeedEstimate | None) -> None:
+        """Learn noise and look of the beads while another method measures, for when it fails.
+
+        Parameters
+        ----------
+        image : TrayImage
+        tracked : SpeedEstimate or None
+            Last speeds of this cycle from tracks that are reliable.
+        """
+        shown: tuple[NDArray[np.uint8], ...] = ()
         self._watched = (self._watched + 1) % _WATCHED
-        if self._watched > 1:
-            return
-        for meter, gray in zip(self._noise, self._shown(image), strict=False):
-            if self._watched == 0:
+        if self._watched <= 1:
+            shown = self._shown(image)
+            self._watch_noise(shown)
+        if self._is_needed(image.stamp_ns, tracked) and self._speeds is not None:
+            shown = shown or self._shown(image)
+            if shown and self._noise_powers:
+                copies = [gray.copy() for gray in shown]
+                self._speeds.learn(self._pairs, copies, self._noise_powers)
+
+    def _watch_noise(self, shown: Sequence[NDArray[np.uint8]]) -> None:
+        """Measure the noise between two images of `_WATCHED`."""
+        if self._watched == 0:
+            for meter, gray in zip(self._noise, shown, strict=False):
                 meter.start_from(gray)
-            else:
-                meter.push(gray)
+        elif shown:
+            self._noise_powers = [
+                meter.push(gray) for meter, gray in zip(self._noise, shown, strict=True)
+            ]
+
+    def _is_needed(self, stamp_ns: int, tracked: SpeedEstimate | None) -> bool:
+        """Whether something is to be learnt from this image, by the paths of the beads."""
+        last_ns, self._watched_ns = self._watched_ns, stamp_ns
+        if self._speeds is None or self._speeds.calibrated or tracked is None:
+            self._pairs = []
+            return False
+        speeds = tracked.species_speeds if self._separated else (tracked.mean_projected_speed,)
+        self._pairs = self._pairs or self._speeds.unrelated_pairs()
+        if last_ns is None or len(speeds) != len(self._pairs):
+            return False
+        seconds = (stamp_ns - last_ns) / NS
+        paths = [np.nan_to_num(speed.value) * self._scale * seconds for speed in speeds]
+        due = [pairs.move(path) for pairs, path in zip(self._pairs, paths, strict=True)]
+        return all(due)
 
     def flush(self) -> tuple[SpeedEstimate, ...]:
         """Speeds held back in a recording too short to know the beads, flagged as uncertain."""

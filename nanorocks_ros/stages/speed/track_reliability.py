@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import Tracks
 
-# Share of the beads of each species that must be tracked, to begin and to go on; and where there
-# are grains, whose tracks are cut where they jump (`jumping_tracks`).
+# Share of the beads of each species that must be tracked, of those that do not lie under others,
+# to begin and to go on; and where there are grains, whose tracks are cut where they jump
+# (`jumping_tracks`).
 _ENOUGH, _STILL_ENOUGH = 0.85, 0.7
 _ENOUGH_GRAINS, _STILL_ENOUGH_GRAINS, _RELIABLE_SHARE_GRAINS = 0.7, 0.55, 0.4
 # Pictures over which the median of that share is taken; and speeds, for the share of the beads
@@ -56,6 +57,8 @@ class TrackReliability:
         Whether a species is too crowded to be tracked, so that it will never be reliable.
     lowest_share : float
         Share of the beads that must be tracked through the window of a speed.
+    hidden : float, 0 to 1
+        Share of the beads that lie under others, of the species that has most of them.
     """
 
     def __init__(self, tray: Tray, *, crowded: bool) -> None:
@@ -64,6 +67,7 @@ class TrackReliability:
         self._frames = 0
         self._enough, self._nearly_all = False, False
         self._tracked: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
+        self._hidden: deque[float] = deque(maxlen=_MEMORY_SPEEDS)
         grains = any(species.properties.shape == 'grain' for species in tray.species)
         # Grains that are shaken are confused at once; how many are seen tells it too late.
         self._steps: deque[float] = deque(maxlen=1 if grains else _MEMORY_SPEEDS)
@@ -78,6 +82,7 @@ class TrackReliability:
         self.hopeless = crowded
         self.reliable, self.reliable_contacts = False, False
         self.judged = crowded
+        self.hidden = 0.0
 
     @property
     def told_apart(self) -> bool:
@@ -95,6 +100,7 @@ class TrackReliability:
         self._frames += 1
         if self.hopeless:
             return
+        share /= 1.0 - self.hidden
         self.judged = self._frames >= _MEMORY_FRAMES
         self._enough = share >= self._enough_share[int(self.reliable)]
         self._nearly_all = share >= (_STILL_ENOUGH if self.reliable_contacts else _ENOUGH)
@@ -102,14 +108,21 @@ class TrackReliability:
             self._conclude()
 
     def push_speeds(
-        self, share: float, speeds: NDArray[np.float64], intervals_ns: NDArray[np.int64]
+        self,
+        share: float,
+        hidden: float,
+        speeds: NDArray[np.float64],
+        intervals_ns: NDArray[np.int64],
     ) -> None:
         """Take what the speeds of one window say.
 
         Parameters
         ----------
         share : float
-            Of the beads that were tracked through the window, of the worst species.
+            Of the beads that do not lie under others, those that were tracked through the window,
+            of the worst species.
+        hidden : float, 0 to 1
+            Share of the beads that lie under others, of the species that has most of them.
         speeds : ndarray (species,), [m/s]
             NaN where it is not known.
         intervals_ns : ndarray of int64, [ns]
@@ -118,9 +131,12 @@ class TrackReliability:
         interval = median(intervals_ns.tolist()) / 1_000_000_000
         step = float(np.max(np.nan_to_num(speeds) * interval / self._neighbours))
         self._tracked.append(share)
+        self._hidden.append(hidden)
         self._steps.append(step)
         self._usual_tracked = median(self._tracked)
         self._usual_step = median(self._steps)
+        # Crowded grains hide each other everywhere, which the structure function takes in account.
+        self.hidden = 0.0 if self.hopeless else median(self._hidden)
 
     def without_colour(self) -> None:
         """Judge by an image without colour, in which nothing can be tracked."""

@@ -86,7 +86,7 @@ class TrackSpeed:
         self._jumps = JumpingTracks(self._pixels_per_metre) if self._flagged_path else None
         self._skipped = SkippedFrames(self._pixels_per_metre)
         self._next_ns: int | None = None
-        self._last_ns: int | None = None
+        self._last: SpeedEstimate | None = None
         self._flags = Quality(0)
         self._cycle: int | None = None
         self._cycle_start_ns: int | None = None
@@ -113,6 +113,13 @@ class TrackSpeed:
         self._next_ns = record.stamp_ns + self._interval_ns
         return self._speeds(record)
 
+    def last_in(self, cycle: int | None) -> SpeedEstimate | None:
+        """The last speed of a cycle, while the tracks are reliable."""
+        last = self._last
+        if last is None or last.cycle != (cycle or 0) or not self.reliability.reliable:
+            return None
+        return last
+
     def flush(self) -> tuple[SpeedEstimate, ...]:
         """Nothing: a speed is known as soon as its window is."""
         self.reliability.conclude()
@@ -121,6 +128,7 @@ class TrackSpeed:
     def _begin_image(self, image: TrayImage) -> None:
         if self._cycle not in (None, image.cycle):
             self._recent.clear()
+            self._skipped = SkippedFrames(self._pixels_per_metre)
             self._next_ns = None
         self._cycle, self._cycle_start_ns = image.cycle, image.cycle_start_ns
         self._flags |= image.quality
@@ -150,9 +158,8 @@ class TrackSpeed:
         )
         if mean is None or not np.isfinite(mean.mean_projected_speed):
             return ()
-        if self._last_ns is not None and mean.stamp_ns <= self._last_ns:
+        if self._last is not None and mean.stamp_ns <= self._last.stamp_ns:
             return ()
-        self._last_ns = mean.stamp_ns
         speeds = [
             Measured(speed.mean_projected_speed, speed.mean_projected_speed_error)
             if speed
@@ -160,7 +167,8 @@ class TrackSpeed:
             for speed in of_species
         ]
         self.reliability.push_speeds(
-            min(speed.share if speed else 0.0 for speed in of_species),
+            min(speed.share_of_visible if speed else 0.0 for speed in of_species),
+            max(speed.hidden if speed else 0.0 for speed in of_species),
             self._speeds_told_apart(speeds, np.diff(series.stamps)),
             np.diff(series.stamps),
         )
@@ -174,21 +182,20 @@ class TrackSpeed:
         is_certain = (mean.beyond_errors or at_rest) and self.reliability.told_apart
         if path < self._flagged_path or not is_certain:
             flags |= Quality.UNCERTAIN
-        return (
-            SpeedEstimate(
-                stamp_ns=mean.stamp_ns,
-                tray=self._tray.number,
-                cycle=self._cycle or 0,
-                cycle_start_ns=self._cycle_start_ns,
-                mean_projected_speed=Measured(
-                    mean.mean_projected_speed, mean.mean_projected_speed_error
-                ),
-                window=mean.window,
-                method=SpeedMethod.TRACKING,
-                quality=flags,
-                species_speeds=tuple(speeds[:2]),
+        self._last = SpeedEstimate(
+            stamp_ns=mean.stamp_ns,
+            tray=self._tray.number,
+            cycle=self._cycle or 0,
+            cycle_start_ns=self._cycle_start_ns,
+            mean_projected_speed=Measured(
+                mean.mean_projected_speed, mean.mean_projected_speed_error
             ),
+            window=mean.window,
+            method=SpeedMethod.TRACKING,
+            quality=flags,
+            species_speeds=tuple(speeds[:2]),
         )
+        return (self._last,)
 
 
 def _shortest_paths(tray: Tray, pixels_per_metre: float) -> tuple[float, float]:

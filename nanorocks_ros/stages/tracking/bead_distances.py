@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 _RELIABLE_RATIO = 3.2
 # Smallest share of a species that is taken for a sample of all of it.
 _MIN_SAMPLE_SHARE = 0.3
-# Error of the correction for hidden beads over the correction: in drawn films it left 0.2 to 1 of
-# itself.
-_HIDDEN_ERROR = 0.7
+HIDDEN_ERROR = 0.7
+"""Error of the correction for hidden beads over the correction: in drawn films it left 0.2 to 1 of
+itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class BeadDistances:
             0.5 * math.sqrt(_mean(bead_scatter * bead_scatter)) / math.sqrt(self.whole_window.size)
         )
         shared_error = self._shared_share() * half
-        hidden_error = _HIDDEN_ERROR * (half - of_seen)
+        hidden_error = HIDDEN_ERROR * (half - of_seen)
         error = math.hypot(
             noise_error * per_time, 0.5 * shortened, scatter, shared_error, hidden_error
         )

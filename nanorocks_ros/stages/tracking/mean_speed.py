@@ -97,6 +97,11 @@ class MeanSpeed:
     beyond_errors: bool
     hidden: float
 
+    @property
+    def share_of_visible(self) -> float:
+        """Share of the beads that do not lie under others."""
+        return self.share / (1.0 - self.hidden)
+
 
 def mean_speed(
     tracks: Sequence[Tracks], *, least_distance: float, species: int | None = None

@@ -9,7 +9,7 @@ import pytest
 from bead_paths import PIXEL, RATE, tracks_of
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import Quality
+from nanorocks_ros.records import Quality, TrayImage
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.stages.speed.skipped_frames import SkippedFrames
 from nanorocks_ros.stages.speed.track_speed import TrackSpeed
@@ -105,3 +105,18 @@ def test_speeds_from_tracks_that_lack_frames_are_flagged(every, flagged):
         for speed in stage.push(tracks)
     ]
     assert (Quality.SKIPPED_FRAMES in speeds[-1].quality) == flagged
+
+
+def test_frames_that_one_cycle_lacks_do_not_flag_the_next():
+    stage = TrackSpeed(PipelineSettings(), load_trays()[1], crowded=False)
+    places = flights(800)
+    kept = np.flatnonzero((np.arange(800) % 10 != 9) | (np.arange(800) >= 400))
+    image = TrayImage(stamp_ns=0, tray=1, gray=np.zeros((4, 4), np.uint8), cycle_start_ns=0)
+    cycles = {1: [], 2: []}
+    for number, tracks in zip(kept, tracks_of(places[kept], jitter=JITTER), strict=True):
+        cycle = 1 if number < 400 else 2
+        color = np.zeros((4, 4, 3), np.uint8)
+        stage.push(replace(image, stamp_ns=tracks.stamp_ns, cycle=cycle, color=color))
+        cycles[cycle] += stage.push(tracks)
+    assert Quality.SKIPPED_FRAMES in cycles[1][-1].quality
+    assert not any(Quality.SKIPPED_FRAMES in speed.quality for speed in cycles[2])

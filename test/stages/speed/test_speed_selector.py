@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod
+from nanorocks_ros.records import Measured, Quality, SpeedEstimate, SpeedMethod, Tracks
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.speed.speed_selector import SpeedSelector
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
@@ -40,6 +41,25 @@ def selector(method='auto', crowded=False):
     settings = with_values(PipelineSettings(), {'speed.method': method}, 'test')
     tracks = TrackReliability(TRAY, crowded=crowded)
     return SpeedSelector(settings.speed, tracks), tracks
+
+
+def seen_tracks(count):
+    """Tracks of so many beads, all of them seen."""
+    return Tracks(
+        stamp_ns=0,
+        tray=1,
+        ids=np.arange(count, dtype=np.int32),
+        species=np.zeros(count, dtype=np.int32),
+        displacement=np.zeros(2),
+        positions=np.zeros((count, 2)),
+        position_errors=np.full(count, 2e-6),
+        velocities=np.zeros((count, 2)),
+        velocity_errors=np.full(count, 1e-5),
+        radii=np.full(count, 1e-3),
+        radius_errors=np.full(count, 1e-6),
+        seen=np.ones(count, dtype=bool),
+        expected=np.array([TRAY.count], dtype=np.int32),
+    )
 
 
 def test_speeds_from_tracks_wait_until_the_tracks_are_judged():
@@ -97,3 +117,27 @@ def test_a_speed_known_to_less_than_20_per_cent_is_flagged_unless_the_beads_rest
     at_rest = by_tracks(2.0, value=1e-5, error=3e-5)
     assert stage.push([vague]) == (replace(vague, quality=Quality.UNCERTAIN),)
     assert stage.push([at_rest]) == (at_rest,)
+
+
+def test_speeds_from_images_have_the_error_of_the_beads_that_lie_under_others():
+    stage, tracks = selector()
+    for _ in range(20):
+        tracks.push_speeds(0.5, 0.2, np.array([1e-3]), np.array([NS // 30]))
+    tracks.without_colour()
+    (crowded,) = stage.push([by_structure(1.0)])
+    error = crowded.mean_projected_speed.error
+    assert error > 0.1 * crowded.mean_projected_speed.value
+    by_set_method, _ = selector('structure_function')
+    assert by_set_method.push([by_structure(1.0)]) == (by_structure(1.0),)
+
+
+def test_beads_that_lie_under_others_do_not_make_tracks_unreliable():
+    usual, crowded = TrackReliability(TRAY, crowded=False), TrackReliability(TRAY, crowded=False)
+    seen = seen_tracks(round(0.72 * TRAY.count))
+    for tracks, hidden in ((usual, 0.0), (crowded, 0.2)):
+        for _ in range(60):
+            share = 0.72 / (1.0 - hidden)
+            tracks.push_speeds(share, hidden, np.array([1e-3]), np.array([NS // 30]))
+            tracks.push(seen)
+    assert not usual.reliable
+    assert crowded.reliable
