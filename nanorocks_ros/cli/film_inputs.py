@@ -49,7 +49,7 @@ def use_imports(options: argparse.Namespace) -> None:
     names = [name for text in value for name in _expanded(text)] if is_list else [value]
     options.named = names
     if len(names) == 1 and not is_pattern(names[0]):
-        check_film_or_bag(names[0])
+        check_film_or_bag(names[0], many=is_list)
     films = [name for name in names if _is_film(name)]
     if films:
         options.announce_films(options, films)

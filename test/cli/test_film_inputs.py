@@ -129,7 +129,12 @@ def test_what_is_neither_film_nor_bag_is_told_apart(tmp_path, capsys):
     )
     assert 'the folder of all its images' in refused(['info', str(tmp_path / 'one.png')], capsys)
     assert 'without a recording' in refused(['info', str(tmp_path / 'empty')], capsys)
-    assert f'name one, such as {film}' in refused(['info', str(tmp_path / 'videos')], capsys)
+    folder = refused(['info', str(tmp_path / 'videos')], capsys)
+    assert f'is a folder of 1 recording; name one, such as {film}' in folder
+    assert main(['import', str(film), '-o', str(tmp_path / 'bags' / 'a')]) == 0
+    capsys.readouterr()
+    folder = refused(['info', str(tmp_path / 'bags')], capsys)
+    assert f'is a folder of 1 recording; name one, such as {tmp_path / "bags" / "a"}' in folder
 
 
 def test_notices_name_the_film_and_not_its_import(tmp_path, capsys):

@@ -9,7 +9,8 @@ import shlex
 from pathlib import Path
 
 from nanorocks_ros.errors import RecordingError, did_you_mean_file
-from nanorocks_ros.recordings.bag.find_bags import is_collection, is_recording
+from nanorocks_ros.outputs.safe_text import counted
+from nanorocks_ros.recordings.bag.find_bags import find_bags, is_collection, is_recording
 from nanorocks_ros.recordings.film.image_folder import IMAGE_SUFFIXES
 from nanorocks_ros.studies.film_import.film_cache import is_film
 from nanorocks_ros.studies.film_import.find_films import films_in_folder
@@ -19,10 +20,16 @@ _REMEDY = 'name a video, a folder of images or a bag'
 _YAML = frozenset({'.yaml', '.yml'})
 
 
-def check_film_or_bag(name: str) -> None:
+def check_film_or_bag(name: str, *, many: bool = False) -> None:
     """Check that a name is of a film or of a bag.
 
     What cannot be read, is empty or damaged passes: its reader says so.
+
+    Parameters
+    ----------
+    name : str
+    many : bool
+        Whether a folder of bags does as well.
 
     Raises
     ------
@@ -38,7 +45,7 @@ def check_film_or_bag(name: str) -> None:
         # To look into a pipe would block.
         if not folder and not (path.is_file() and path.stat().st_size):
             return
-        if is_recording(path) or is_film(path) or is_collection(path):
+        if is_recording(path) or is_film(path) or (many and is_collection(path)):
             return
         (_refuse_folder if folder else _refuse_file)(name)
     except OSError:
@@ -47,11 +54,13 @@ def check_film_or_bag(name: str) -> None:
 
 def _refuse_folder(name: str) -> None:
     """Refuse a folder that is neither a recording nor images."""
-    films = films_in_folder(Path(name)).films
-    if films:
-        videos = 'one video' if len(films) == 1 else f'{len(films)} films'
+    inside = find_bags([name]).bags if is_collection(Path(name)) else []
+    inside += films_in_folder(Path(name)).films
+    if inside:
         raise RecordingError(
-            name, f'is a folder of {videos}', f'name one, such as {shlex.quote(str(films[0]))}'
+            name,
+            f'is a folder of {counted(len(inside), "recording")}',
+            f'name one, such as {shlex.quote(str(inside[0]))}',
         )
     raise RecordingError(name, 'is a folder without a recording, video or image', _REMEDY)
 
