@@ -67,6 +67,16 @@ def test_a_cycle_that_is_over_is_opened_and_left(look, cycled, results):
     text_is(page, '#state', 'cycle 3, cooling')
 
 
+def test_past_cycles_stay_while_the_next_one_is_measured(look, cycled, results):
+    page = look(cycled.url)
+    text_is(page, '#finals', 'Cycle 2')
+    changed = replace(told(results, (3,))[40].mean_projected_speed, value=0.0421)
+    cycled.take(replace(told(results, (3,))[40], mean_projected_speed=changed))
+    text_is(page, '#speed', '42.1 mm/s')
+    page.locator('#finals button', has_text='Cycle 1').click()
+    text_is(page, '#state', 'cycle 1, as it was')
+
+
 def test_all_plots_of_a_tray_are_zoomed_and_moved_together(look, cycled):
     page = look(cycled.url)
     page.locator('#finals button', has_text='Cycle 1').click()
@@ -149,6 +159,7 @@ def test_a_plot_is_saved_as_a_picture(look, cycled, tmp_path):
 def test_nothing_is_saved_before_there_is_a_plot(look, serve, results):
     server = serve()
     page = look(server.url)
+    server.expect(1)
     text_is(page, '#title', 'Tray 1')
     assert page.locator('#speed-chart .csv').is_disabled()
     assert page.locator('#speed-chart .png').is_disabled()
