@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from benchmarks.contacts import METRE_PX, contacts_of, film
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.figure_files import figure_file
-from nanorocks_ros.outputs.figure_style import BLACK, BLUE, TWO_COLUMNS
+from nanorocks_ros.outputs.figure_style import BLACK, BLUE, TWO_COLUMNS, scale_bar
 from nanorocks_ros.records import PairCollision, Rebound, Tracks, TrayImage
 
 _PAIRS, _WALLS = 0.89, 0.97
@@ -82,8 +82,10 @@ def _draw(axes: Axes, frames: Film, contact: Rebound | PairCollision, centre: np
         _draw_path(axes, frames_shown, track, contact.stamp_ns, colour)
     x, y = centre * METRE_PX
     rows, columns = strobe.shape[:2]
-    axes.set_xlim(max(x - _AROUND, -4.0), min(x + _AROUND, columns))
-    axes.set_ylim(min(y + _AROUND, rows), max(y - _AROUND, 0.0))
+    # The image ends half a pixel beyond the centres of its outer pixels.
+    axes.set_xlim(max(x - _AROUND, -0.5), min(x + _AROUND, columns - 0.5))
+    axes.set_ylim(min(y + _AROUND, rows - 0.5), max(y - _AROUND, -0.5))
+    scale_bar(axes, 1e-3 * METRE_PX)
     axes.set_xticks([])
     axes.set_yticks([])
 
@@ -123,13 +125,12 @@ def write(folder: Path) -> None:
     with figure_file(folder / 'rebounds.png', TWO_COLUMNS, 95.0) as figure:
         left, right = figure.subplots(1, 2)
         _draw(left, frames, rebound, rebound.place)
-        left.axvline(-0.5, color='black', lw=1.0)
         ratio = rebound.outgoing.value / rebound.incoming.value
         error = np.hypot(rebound.outgoing.error, rebound.incoming.error) / rebound.incoming.value
         left.set_title(
             f'A rebound: {1e3 * rebound.incoming.value:.2f} to the wall, '
             f'{1e3 * rebound.outgoing.value:.2f} mm/s from it\n'
-            f'ratio {ratio:.3f} ± {error:.3f} (true: {_WALLS})',
+            f'ratio {ratio:.3f} ± {error:.3f} (true: {_WALLS}); filled: before',
         )
         _draw(right, frames, pair, pair.place + 0.5 * pair.separation)
         first_centre, second_centre = pair.place, pair.place + pair.separation
@@ -147,7 +148,7 @@ def write(folder: Path) -> None:
         apart = np.hypot(*pair.separation) / pair.radii.sum()
         right.set_title(
             f'A collision: {approach:.2f} and {parting:.2f} mm/s along the line\n'
-            f'of centres (black), {apart:.3f} diameters apart',
+            f'of centres, {apart:.3f} diameters apart; filled: before',
         )
 
 

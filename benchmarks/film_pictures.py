@@ -78,6 +78,12 @@ def measured(name, scene, folder):
     return track_bag(bag, recorded_settings(told, {'trays_file'}, {}, 'film').settings)
 
 
+def judgement(verdict):
+    """Whether the beads can be used, and why not."""
+    flags = ', '.join(flag.name.replace('_', ' ') for flag in verdict.flags)
+    return 'usable' if verdict.usable else f'not usable: {flags}'
+
+
 def panel(name, tracked):
     """The last frame with rings and paths, and below it the verdict."""
     (verdict,) = tracked.verdicts[1]
@@ -87,7 +93,7 @@ def panel(name, tracked):
     words = [
         name,
         verdict.text.partition(': ')[2],
-        'usable' if verdict.usable else ', '.join(flag.name for flag in verdict.flags),
+        judgement(verdict),
     ]
     label = np.full((18 * _LINES + 8, picture.shape[1], 3), 255, dtype=np.uint8)
     colour = (0, 110, 0) if verdict.usable else (0, 0, 190)
@@ -106,11 +112,9 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             tracked = measured(name, scene, Path(folder))
         (verdict,) = tracked.verdicts[1]
-        flags = ', '.join(flag.name for flag in verdict.flags) or '-'
         drawn = scene.count
-        words = 'usable' if verdict.usable else 'NOT USABLE'
         seen = np.mean([record.seen.sum() for record in tracked.tracks[1]])
-        print(f'| {name} | {seen:.1f} of {drawn} | {words}; {flags} |', flush=True)
+        print(f'| {name} | {seen:.1f} of {drawn} | {judgement(verdict)} |', flush=True)
         panels.append(panel(name, tracked))
     grid = [
         np.hstack([np.pad(part, ((4, 4), (4, 4), (0, 0)), constant_values=255) for part in row])

@@ -28,7 +28,7 @@ _RIGHT = 0.3
 _SEEDS = (1, 2, 3)
 _LEARNING_FRAMES = 25
 _EVERY = 6
-_RING = 0, 255, 255
+_RING, _INK = (0, 255, 255), (0, 0, 0)
 _UNKNOWN = math.nan, math.nan
 
 
@@ -145,7 +145,9 @@ def picture(path):
         frames, _ = draw(scene)
         discs, _, _ = discs_in(frames, _UNKNOWN)
         tile = with_discs(frames[0], discs[0])
-        cv2.putText(tile, name, (8, 292), cv2.FONT_HERSHEY_SIMPLEX, 0.55, _RING, 1, cv2.LINE_AA)
+        for colour, thickness in ((_INK, 4), (_RING, 1)):
+            cv2.putText(tile, name, (8, 292), cv2.FONT_HERSHEY_SIMPLEX, 0.55, colour, thickness,
+                        cv2.LINE_AA)  # fmt: skip
         tiles.append(tile)
     rows = [np.hstack(tiles[k : k + 3]) for k in range(0, len(tiles), 3)]
     cv2.imwrite(path, np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 75])

@@ -92,7 +92,8 @@ def _widths(axes):
     axes.set_title(f'tray 1, {TOGETHER} cycles; dashed: 0.1 mm/s of noise')
     # Room for the legend below.
     axes.set_ylim(3e-4)
-    axes.legend(loc='lower left', ncols=2, columnspacing=0.8)
+    opaque = {'frameon': True, 'framealpha': 1.0, 'edgecolor': 'none'}
+    axes.legend(loc='lower left', ncols=2, columnspacing=0.8, **opaque)
 
 
 def _readings(axes):

@@ -5,11 +5,14 @@ Tested by ``test/nodes/base/test_diagnostics.py``.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
 
 class NanorocksError(Exception):
@@ -80,3 +83,12 @@ def did_you_mean(word: str, known: Iterable[str] | Mapping[str, str]) -> str:
     nearest = get_close_matches(word.casefold(), by_letters, n=2, cutoff=0.7)
     proposals = dict.fromkeys(by_letters[name] for name in nearest)
     return f'did you mean {" or ".join(proposals)}?' if proposals else ''
+
+
+def did_you_mean_file(path: Path) -> str:
+    """A question with the files beside a missing one whose names are nearest; empty if none is."""
+    beside: dict[str, str] = {}
+    with suppress(OSError):
+        names = [entry.name for entry in path.parent.iterdir() if not entry.name.startswith('.')]
+        beside = {name: shlex.quote(str(path.with_name(name))) for name in names}
+    return did_you_mean(path.name, beside)

@@ -12,7 +12,12 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.cli.remedies import about_own_recording, results_beside, with_own_files
+from nanorocks_ros.cli.remedies import (
+    about_own_recording,
+    print_notices,
+    results_beside,
+    with_own_files,
+)
 from nanorocks_ros.errors import NanorocksError
 
 if TYPE_CHECKING:
@@ -125,8 +130,7 @@ def _run_one(options: argparse.Namespace) -> int:
             written = f'nanorocks: results in {folder}'
         except NanorocksError as unwritten:
             error = unwritten
-    for notice in analysis.notices:
-        print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
+    print_notices(analysis.notices, options)
     if options.json:
         values = about_own_recording(as_json(analysis), options)
         print(json.dumps(values, allow_nan=False))

@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
     """Measure cluster sizes, write and print them, and return the exit code."""
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
 
@@ -62,8 +63,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in (*assumed, *clusters.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    print_notices((*assumed, *clusters.notices), options)
     if '--table' in files:
         write_clusters(files['--table'], clusters)
     if '--output' in files:

@@ -29,24 +29,34 @@ def accept_films(
 def use_imports(options: argparse.Namespace) -> None:
     """Import the films among the bags that the options name, and put the imports there.
 
-    `options.named` keeps what the user named: a list of str.
+    `options.named` keeps what the user named: a list of str; `options.imports` has the name of
+    each film by the path of its import.
 
     Raises
     ------
     RecordingError
-        If a film cannot be read, or its import cannot be written.
+        If a single name is no film and no bag, a film cannot be read, or its import cannot be
+        written.
     """
     argument = getattr(options, _ARGUMENT, None)
     if argument is None:
         return
+    from nanorocks_ros.recordings.bag.find_bags import is_pattern
+    from nanorocks_ros.studies.film_import.named_film import check_film_or_bag
+
     value = getattr(options, argument)
     is_list = isinstance(value, list)
     names = [name for text in value for name in _expanded(text)] if is_list else [value]
     options.named = names
+    if len(names) == 1 and not is_pattern(names[0]):
+        check_film_or_bag(names[0], many=is_list)
     films = [name for name in names if _is_film(name)]
     if films:
         options.announce_films(options, films)
     recordings = [_recording(name) for name in names]
+    options.imports = {
+        bag: name for bag, name in zip(recordings, names, strict=True) if bag != name
+    }
     setattr(options, argument, recordings if is_list else recordings[0])
 
 

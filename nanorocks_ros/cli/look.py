@@ -47,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     """Process the bag up to the frame, print and draw it, and return the exit code."""
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.preprocessing_steps import steps_of_bag
 
@@ -68,8 +69,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in (*assumed, *steps.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    print_notices((*assumed, *steps.notices), options)
     if options.json:
         print(json.dumps(_as_json(steps), allow_nan=False))
     else:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.outputs.named_recordings import with_commands
+from nanorocks_ros.outputs.named_recordings import with_commands, with_film
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterable
 
 # Commands in remedies that describe a tray by its number alone.
 _BY_NUMBER = re.compile(r'nanorocks (?:library|cluster-curve|simulate) --trays? \d+')
@@ -54,10 +56,17 @@ def with_own_files(text: str, options: argparse.Namespace | None) -> str:
     """
     if options is None:
         return text
+    text = _with_named_films(text, options)
     trays_file = _words(options, {'trays_file': '--trays-file'})
     text = _BY_NUMBER.sub(lambda match: shlex.join([*match[0].split(), *trays_file]), text)
     named_text: str = about_own_recording(text, options)
     return named_text
+
+
+def print_notices(notices: Iterable[str], options: argparse.Namespace) -> None:
+    """Print notices for the user, one line each, with the user's own files in them."""
+    for notice in notices:
+        print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
 
 
 def about_own_recording(values: Any, options: argparse.Namespace) -> Any:
@@ -66,6 +75,14 @@ def about_own_recording(values: Any, options: argparse.Namespace) -> Any:
     if len(named) != 1:
         return values
     return with_commands(values, lambda command: _on_recording(command, named[0], options))
+
+
+def _with_named_films(text: str, options: argparse.Namespace) -> str:
+    """A text that names films as the user did, where it names their imports."""
+    imports: dict[str, str] = getattr(options, 'imports', {})
+    for bag, film in imports.items():
+        text = with_film(text, bag, film)
+    return text
 
 
 def results_beside(recording: str, kind: str) -> str:

@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
     """Measure speeds, print and write them, and return the exit code."""
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.speed_comparison import compare_speeds
 
@@ -60,8 +61,7 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in (*assumed, *speeds.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    print_notices((*assumed, *speeds.notices), options)
     cycle = _cycle(speeds, options.cycle)
     if options.json:
         print(json.dumps(_as_json(speeds), allow_nan=False))

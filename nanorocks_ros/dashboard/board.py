@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.dashboard.past_cycles import PastCycles
 from nanorocks_ros.dashboard.tray_board import TrayBoard
 from nanorocks_ros.settings import DashboardSettings
-from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.products import CURVES
 
 if TYPE_CHECKING:
@@ -127,9 +126,8 @@ class Board:
 def columns() -> dict[str, list[str]]:
     """Names of the columns of each curve, as in the tables of `nanorocks analyse`."""
     named = {}
-    for record, product in CURVES.items():
-        units = {field.name: field.unit for field in layout(record).fields}
-        named[product.name] = [f'{name} [{units[name]}]' for name in ('time', *product.curve)]
+    for product in CURVES.values():
+        named[product.name] = ['time', *product.curve]
     return named
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, did_you_mean_file
 from nanorocks_ros.experiment.yaml_limits import LOADER, check_yaml
 from nanorocks_ros.limits import YAML_BYTES, require_regular_file
 
@@ -94,7 +94,8 @@ def read_text(path: Path, expected: str) -> str:
         return path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, 'strerror', None) or 'is not UTF-8 text'
-        raise ConfigurationError(str(path), reason, f'name {expected}') from error
+        near = did_you_mean_file(path) if isinstance(error, FileNotFoundError) else ''
+        raise ConfigurationError(str(path), reason, near or f'name {expected}') from error
 
 
 class YamlLines:

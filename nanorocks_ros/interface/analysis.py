@@ -74,11 +74,12 @@ def analyse(
     """
     with in_python():
         told = told_settings(settings, trays, trays_file)
-        analysed, notices = [], []
+        analysed: list[AnalysedRecording] = []
+        notices: list[str] = []
         for path in named_paths(recordings):
             own = recording(path, progress=progress)
             recorded = settings_of(own.bag, told)
-            notices += [*own.notices, *recorded.notices]
+            notices += own.named((*own.notices, *recorded.notices))
             kept = _KeptTracks() if keep_tracks else None
             with count_bar(f'analysing {own.name}', shown=progress) as show:
                 analysis = analyse_bag(
@@ -89,6 +90,7 @@ def analyse(
                     scratch=Path(tempfile.gettempdir()),
                     observer=kept,
                 )
+            analysis.notices[:] = own.named(analysis.notices)
             analysed.append(
                 AnalysedRecording(
                     name=own.name,

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 from nanorocks_ros.errors import ConfigurationError, RecordingError, did_you_mean
 from nanorocks_ros.experiment.recorded_experiment import RecordedSettings, recorded_settings
 from nanorocks_ros.interface.progress_bars import part_bar
+from nanorocks_ros.outputs.named_recordings import with_film
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.recordings.bag.find_bags import find_bags, is_collection, is_pattern
 from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.settings import PipelineSettings, rows, with_values
 from nanorocks_ros.studies.film_import.film_cache import cached_import, is_film
+from nanorocks_ros.studies.film_import.named_film import check_film_or_bag
 from nanorocks_ros.studies.measure.told_film import described_film
 
 if TYPE_CHECKING:
@@ -95,6 +97,10 @@ class Recording(NamedTuple):
     name: str
     notices: tuple[str, ...] = ()
 
+    def named(self, notices: Iterable[str]) -> tuple[str, ...]:
+        """Notices that name a film where they name its import."""
+        return tuple(with_film(notice, self.bag, self.name) for notice in notices)
+
 
 def recording(path: PathLike, *, progress: bool) -> Recording:
     """The recording of a path; a film is imported beside itself, once.
@@ -102,12 +108,11 @@ def recording(path: PathLike, *, progress: bool) -> Recording:
     Raises
     ------
     RecordingError
-        When there is none, or it cannot be imported.
+        When there is none, or something else, or it cannot be imported.
     """
     own = Path(path).expanduser()
     name = own.resolve().name
-    if not own.exists():
-        raise RecordingError(str(path), 'does not exist', 'name a bag, a video or an image folder')
+    check_film_or_bag(str(own))
     if not is_film(own):
         return Recording(own, name)
     with part_bar(f'importing {name}', shown=progress) as show:
@@ -211,7 +216,7 @@ def described(
         told['trays_file'] = tray.text
         notices += tray.notices
     recorded = settings_of(own.bag, told)
-    return DescribedFilm(own, recorded, notices + recorded.notices)
+    return DescribedFilm(own, recorded, own.named(notices + recorded.notices))
 
 
 def _told_film(values: Mapping[str, Any]) -> ToldByKeywords:

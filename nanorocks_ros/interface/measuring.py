@@ -12,7 +12,7 @@ from nanorocks_ros.interface.measure_result import MeasureResult
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.outputs.named_recordings import with_recording
+from nanorocks_ros.outputs.named_recordings import with_film, with_recording
 from nanorocks_ros.studies.film_import.film_cache import cache_folder
 from nanorocks_ros.studies.measure.measure_film import MeasurePlan, measure_film
 
@@ -89,11 +89,17 @@ def measure(
             settings=own.recorded.settings,
             image_topic=image_topic,
             workers=Workers(processes=workers),
-            name_files=partial(with_recording, recording=Path(film)),
+            name_files=partial(_with_own_film, bag=own.recording.bag, film=Path(film)),
         )
         teller = _Teller(shown=progress)
         measure_film(plan, teller)
         return MeasureResult(plan.folder, own.notices)
+
+
+def _with_own_film(text: str, bag: Path, film: Path) -> str:
+    """A text that names the film, and whose commands do."""
+    named: str = with_recording(with_film(text, bag, film), film)
+    return named
 
 
 def _folder(film: PathLike) -> Path:

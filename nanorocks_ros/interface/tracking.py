@@ -79,7 +79,9 @@ def track(
             tracked = track_bag(
                 own.recording.bag, own.recorded.settings, image_topic=image_topic, progress=show
             )
-        return TrackResult(tracked, Path(film), (*own.notices, *tracked.notices))
+        return TrackResult(
+            tracked, Path(film), (*own.notices, *own.recording.named(tracked.notices))
+        )
 
 
 class TrackResult(Result):

@@ -1,4 +1,4 @@
-"""Commands in remedies name the recording that they are about, so that they can be pasted."""
+"""Messages name the recording as the user did, and their commands can be pasted."""
 
 from __future__ import annotations
 
@@ -26,6 +26,21 @@ def with_recording(values: Any, recording: str | Path) -> Any:
     """
     path = shlex.quote(str(recording))
     return with_commands(values, lambda command: f'nanorocks {command} {path}')
+
+
+def with_film(text: str, bag: str | Path, film: str | Path) -> str:
+    """A text that names a film where it names the bag that was made of it.
+
+    Parameters
+    ----------
+    text : str
+    bag : str or Path
+    film : str or Path
+        As the user named it.
+    """
+    # The one topic of such a bag is of no interest to whoever has a film.
+    own = rf'{re.escape(str(bag))}(?![\w/.-])(: /[\w/]+(?=: ))?'
+    return re.sub(own, lambda _: str(film), text)
 
 
 def with_commands(values: Any, command_line: Callable[[str], str]) -> Any:

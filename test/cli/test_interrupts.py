@@ -7,11 +7,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from nanorocks_ros.cli.interrupts import Interrupts
 
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
 RUN = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
 SIMULATE = ('simulate', '--runs', '400', '--duration', '600', '--tray', '8', '--workers', '2')
 
@@ -27,7 +29,7 @@ def run(options):
 
 import nanorocks_ros.cli.recordings.info as info
 info.run = run
-sys.exit(command.main(['info', 'bag']))
+sys.exit(command.main(['info', sys.argv[1]]))
 """
 AS_ANOTHER_ERROR = """
 import signal, sys
@@ -41,7 +43,7 @@ def run(options):
         raise ImportError('numpy failed to import')
 
 info.run = run
-sys.exit(command.main(['info', 'bag']))
+sys.exit(command.main(['info', sys.argv[1]]))
 """
 
 
@@ -93,7 +95,7 @@ def test_an_interruption_while_functions_are_compiled_is_one_line(tmp_path):
 
 @pytest.mark.parametrize('code', [IN_A_CALL_FROM_C, AS_ANOTHER_ERROR])
 def test_an_interruption_that_other_code_would_lose_ends_the_command(tmp_path, code):
-    check_one_line(started((), tmp_path, code))
+    check_one_line(started((str(SAMPLE),), tmp_path, code))
 
 
 def test_what_ignores_interruptions_goes_on_ignoring_them():

@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import errno
 import os
+from pathlib import Path
 
 import pytest
 
 from nanorocks_ros.cli import main as command
+
+SAMPLE = Path(__file__).parents[2] / 'bags' / 'tray_1_sample'
 
 
 @pytest.mark.parametrize(
@@ -37,7 +40,7 @@ def test_a_full_memory_is_one_line_with_a_remedy(monkeypatch, capsys):
         raise MemoryError
 
     monkeypatch.setattr('nanorocks_ros.cli.recordings.info.run', full)
-    assert command.main(['info', 'bag']) == 1
+    assert command.main(['info', str(SAMPLE)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith('nanorocks: the memory is full; close other programs')
 

@@ -34,7 +34,7 @@ def cycled(serve, results):
 def rows_of(download):
     with open(download.path(), encoding='utf-8') as stream:
         header, *lines = stream.read().splitlines()
-    return header, np.array([[float(cell) for cell in line.split(',')] for line in lines])
+    return header, np.array([[float(cell or 'nan') for cell in line.split(',')] for line in lines])
 
 
 def table(page, figure):
@@ -53,7 +53,7 @@ def test_a_cycle_that_is_over_is_opened_and_left(look, cycled, results):
     assert not page.locator('#picture').is_visible()
     name, header, rows = table(page, 'speed-chart')
     assert name == 'tray_1_cycle_1_speed.csv'
-    assert header.startswith('time [s],mean_projected_speed [m/s],')
+    assert header.startswith('time,mean_projected_speed,')
     speeds = [speed for speed in results.speeds if speed.cycle == 1]
     assert rows[:, 0] == pytest.approx([1e-9 * speed.stamp_ns for speed in speeds])
     values = [speed.mean_projected_speed.value for speed in speeds]
@@ -65,6 +65,16 @@ def test_a_cycle_that_is_over_is_opened_and_left(look, cycled, results):
     page.keyboard.press('ArrowRight')
     text_is(page, '#title', 'Tray 2')
     text_is(page, '#state', 'cycle 3, cooling')
+
+
+def test_past_cycles_stay_while_the_next_one_is_measured(look, cycled, results):
+    page = look(cycled.url)
+    text_is(page, '#finals', 'Cycle 2')
+    changed = replace(told(results, (3,))[40].mean_projected_speed, value=0.0421)
+    cycled.take(replace(told(results, (3,))[40], mean_projected_speed=changed))
+    text_is(page, '#speed', '42.1 mm/s')
+    page.locator('#finals button', has_text='Cycle 1').click()
+    text_is(page, '#state', 'cycle 1, as it was')
 
 
 def test_all_plots_of_a_tray_are_zoomed_and_moved_together(look, cycled):
@@ -146,6 +156,20 @@ def test_a_plot_is_saved_as_a_picture(look, cycled, tmp_path):
     assert picture.shape[2] == 3 or picture[..., 3].min() == 255
 
 
+def test_nothing_is_saved_before_there_is_a_plot(look, serve, results):
+    server = serve()
+    page = look(server.url)
+    server.expect(1)
+    text_is(page, '#title', 'Tray 1')
+    assert page.locator('#speed-chart .csv').is_disabled()
+    assert page.locator('#speed-chart .png').is_disabled()
+    for record in results.speeds[-5:]:
+        server.take(record)
+    page.wait_for_selector('#speed-chart canvas')
+    assert page.locator('#speed-chart .png').is_enabled()
+    assert page.locator('#cor-chart .csv').is_disabled()
+
+
 def test_what_is_frozen_stays_until_it_is_thawed(look, cycled, results):
     page = look(cycled.url)
     text_is(page, '#speed', 'mm/s')
@@ -172,12 +196,12 @@ def test_trays_are_compared(look, cycled, results):
     assert not page.locator('#detail').is_visible()
     name, header, rows = table(page, 'cor-comparison')
     assert name == 'trays_cor_comparison.csv'
-    assert header.startswith('tray [1],cycle [1],restitution [1],restitution_lower [1],')
+    assert header.startswith('tray,cycle,restitution,restitution_lower,')
     final = results.cors[-1].restitution
     assert rows[:, 0].tolist() == [1, 2]
     assert rows[:, 2:5] == pytest.approx(np.array([[final.value, final.lower, final.upper]] * 2))
     _, header, rows = table(page, 'speed-comparison')
-    assert header.split(',')[2] == 'time_since_shake [s]'
+    assert header.split(',')[2] == 'time_since_shake'
     first, second = (rows[rows[:, 0] == number] for number in (1, 2))
     assert first[:, 2] == pytest.approx(second[:, 2])
     assert first[0, 2] < 5.0

@@ -92,6 +92,9 @@ def test_the_summary_tells_what_is_missing_in_the_words_of_python(measured):
     assert 'decay: not read; it needs the container: corners, sides_mm' in text
     assert 'all' in text or 'beads seen' in text
     assert '<table>' in measured._repr_html_()
+    lens = [notice for notice in measured.notices if 'free of distortion' in notice]
+    assert lens
+    assert all('film.avi: neither' in notice and '.nanorocks' not in notice for notice in lens)
     assert isinstance(measured.plot(), Figure)
 
 
@@ -107,3 +110,8 @@ def test_without_any_length_all_is_in_px(film):
 def test_a_film_of_which_nothing_is_told_is_an_error(film):
     with pytest.raises(nr.ConfigurationError, match='diameter_px=31'):
         nr.measure(film)
+
+
+def test_results_are_no_film(measured):
+    with pytest.raises(nr.RecordingError, match=r'is a folder of results.*here film\.avi'):
+        nr.measure(measured.folder, diameter_px=DIAMETER_PX)

@@ -53,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
     """Fit, print and write, and return the exit code."""
     from nanorocks_ros.cli.flags import bag_settings, settings_from
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
@@ -73,12 +74,8 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
-    for notice in (
-        *assumed,
-        *calibration.notices,
-        *(str(error) for error in calibration.refused.values()),
-    ):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    refused = (str(error) for error in calibration.refused.values())
+    print_notices((*assumed, *calibration.notices, *refused), options)
     if options.json:
         print(json.dumps(_as_json(calibration), allow_nan=False))
     else:

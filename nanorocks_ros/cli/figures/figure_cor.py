@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.parsing.tray_options import add_tray
+from nanorocks_ros.cli.remedies import print_notices
 from nanorocks_ros.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -150,8 +151,7 @@ def _settings(options: argparse.Namespace, bag: Path) -> PipelineSettings:
     if not trays_known or len(settings.trays) != 1:
         problem = 'is required with a bag that does not say which single tray it shows'
         raise ConfigurationError('--tray', problem, 'name the tray')
-    for notice in notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    print_notices(notices, options)
     options.tray = settings.trays[0]
     return settings
 

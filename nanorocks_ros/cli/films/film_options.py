@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -84,9 +83,3 @@ def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...
         return ()
     options.trays_file = tray.text
     return tray.notices
-
-
-def print_notices(notices: tuple[str, ...]) -> None:
-    """Print notices for the user, one line each."""
-    for notice in notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)

@@ -105,10 +105,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
     """Settings of the film: by its options, by a trays file, or by what the bag says."""
-    from nanorocks_ros.cli.films.film_options import print_notices, use_described_film
+    from nanorocks_ros.cli.films.film_options import use_described_film
     from nanorocks_ros.cli.flags import bag_settings
+    from nanorocks_ros.cli.remedies import print_notices
 
-    print_notices(use_described_film(options, bag))
+    print_notices(use_described_film(options, bag), options)
     recorded = bag_settings(options, bag)
     if not recorded.trays_known:
         film = shlex.quote(options.named[0])
@@ -118,5 +119,5 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
             f'give their diameter in the picture: nanorocks measure {film} --diameter-px 31 -o '
             f'{shlex.quote(options.output)}; or a file, as --trays-file mine.yaml',
         )
-    print_notices(recorded.notices)
+    print_notices(recorded.notices, options)
     return recorded

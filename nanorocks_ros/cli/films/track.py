@@ -51,13 +51,14 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Track, print and write, and return the exit code."""
-    from nanorocks_ros.cli.films.film_options import print_notices, use_described_film
+    from nanorocks_ros.cli.films.film_options import use_described_film
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.calibration.manual_tracks import read_manual_tracks
 
     _check_outputs(options)
     manual = read_manual_tracks(options.compare) if options.compare else None
-    print_notices(use_described_film(options, Path(options.bag)))
+    print_notices(use_described_film(options, Path(options.bag)), options)
     bag = tracked_bag(options)
     compared = {} if manual is None else _comparisons(bag, manual, options.first_frame)
     if options.json:
@@ -75,6 +76,7 @@ def tracked_bag(options: argparse.Namespace) -> TrackedBag:
     """Track the beads of the bag of the options, with progress; print what is to be known."""
     from nanorocks_ros.cli.flags import bag_settings
     from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 
     settings, assumed, _ = bag_settings(options, options.bag)
@@ -82,8 +84,7 @@ def tracked_bag(options: argparse.Namespace) -> TrackedBag:
         bag = track_bag(
             Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
         )
-    for notice in (*assumed, *bag.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+    print_notices((*assumed, *bag.notices), options)
     return bag
 
 

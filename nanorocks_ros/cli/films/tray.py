@@ -67,8 +67,8 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Describe, recognise, write, and return the exit code."""
-    from nanorocks_ros.cli.films.film_options import print_notices
     from nanorocks_ros.cli.films.recognised_tray import recognised_tray, save
+    from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.measure.film_samples import film_samples
 
@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         tray = recognised_tray(options, samples)
         save(options, tray)
-    print_notices(tray.notices)
+    print_notices(tray.notices, options)
     _print(options, tray.beads)
     return 0 if min(tray.beads.counts) > 0 else EXIT_NOT_USABLE
 

@@ -79,7 +79,7 @@ function take(number, told) {
       rows[name].push(...told[name].rows);
     }
   }
-  trays.set(number, { finals: before?.finals ?? [], ...told, rows, heardAt: performance.now() - 1e3 * told.age });
+  trays.set(number, { finals: before?.finals ?? [], past: before?.past ?? [], ...told, rows, heardAt: performance.now() - 1e3 * told.age });
 }
 
 const silentFor = (tray) => (performance.now() - tray.heardAt) / 1e3;

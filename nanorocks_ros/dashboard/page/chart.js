@@ -76,6 +76,7 @@ export class Chart {
     this.box.append(this.note);
     this.plot = null;
     this.data = null;
+    this.exporters = [];
     if (axis) {
       this.box.tabIndex = 0;
       axis.plots.add(this);
@@ -101,6 +102,7 @@ export class Chart {
   show(data, label) {
     this.data = data;
     this.note.hidden = data !== null;
+    for (const button of this.exporters) button.disabled = data === null;
     this.box.setAttribute('aria-label', data ? label : this.note.textContent);
     if (!data) {
       this.forget();

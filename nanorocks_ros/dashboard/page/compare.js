@@ -95,7 +95,7 @@ export class CorComparison extends Chart {
   table() {
     const cor = ['restitution', 'restitution_lower', 'restitution_upper'];
     const names = ['tray', 'cycle', ...cor, ...cor.map((name) => `wall_${name}`)];
-    return [names.map((name) => `${name} [1]`), this.rows.filter((row) => known(row[2]))];
+    return [names, this.rows.filter((row) => known(row[2]))];
   }
 }
 
@@ -149,7 +149,7 @@ export class SpeedComparison extends Chart {
   }
 
   table() {
-    const names = ['tray [1]', 'cycle [1]', 'time_since_shake [s]', 'mean_projected_speed [m/s]', 'mean_projected_speed_error [m/s]'];
+    const names = ['tray', 'cycle', 'time_since_shake', 'mean_projected_speed', 'mean_projected_speed_error'];
     const [low, high] = this.span;
     return [names, this.rows.filter((row) => row[2] >= low && row[2] <= high)];
   }

@@ -11,9 +11,9 @@ function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 
-const cell = (value) => (value === null || value === undefined ? 'nan' : String(value));
+const cell = (value) => (value === null || value === undefined ? '' : String(value));
 
-/** A table as `nanorocks analyse` writes them: names with units in the first line. */
+/** A table as `nanorocks analyse` writes them: names in the first line, SI, what is not known empty. */
 function saveTable(name, columns, rows) {
   const lines = [columns, ...rows.map((row) => row.map(cell))].map((row) => row.join(','));
   save(new Blob([`${lines.join('\n')}\n`], { type: 'text/csv' }), `${name}.csv`);
@@ -42,6 +42,9 @@ function savePicture(name, title, plot) {
 export function offerExports(figure, chart, nameOf, table) {
   const title = () => `${figure.querySelector('h3').textContent.replace(/\s+/g, ' ')}, ${nameOf().replaceAll('_', ' ')}`;
   const fileOf = () => `${nameOf()}_${figure.id.replace('-chart', '').replace('-', '_')}`;
-  figure.querySelector('.csv').addEventListener('click', () => chart.plot && saveTable(fileOf(), ...table()));
-  figure.querySelector('.png').addEventListener('click', () => chart.plot && savePicture(fileOf(), title(), chart.plot));
+  const [csv, png] = ['.csv', '.png'].map((name) => figure.querySelector(name));
+  csv.addEventListener('click', () => saveTable(fileOf(), ...table()));
+  png.addEventListener('click', () => savePicture(fileOf(), title(), chart.plot));
+  chart.exporters = [csv, png];
+  for (const button of chart.exporters) button.disabled = !chart.plot;
 }

@@ -2,7 +2,7 @@
 
 export const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
-export const fixed = (value, digits) => (known(value) ? value.toFixed(digits) : '–');
+export const fixed = (value, digits) => (known(value) ? value.toFixed(digits).replace('-', '−') : '–');
 
 export const restitution = (value) => fixed(value, 3);
 
@@ -50,7 +50,7 @@ export const corState = (cor) => COR_STATES[cor.status] ?? String(cor.status);
 
 /** What the headline is from, and what the decay alone says where contacts contradict it. */
 export function source(cor, contacts) {
-  if (cor.headline !== 'contacts') return contacts ? `, with ${contacts} single contacts` : '';
+  if (cor.headline !== 'contacts') return contacts ? `, with ${contacts} single contact${contacts === 1 ? '' : 's'}` : '';
   const decay = known(cor.decay_restitution) ? ` (the decay says ${restitution(cor.decay_restitution)})` : '';
   return `, from ${contacts} contacts alone, since ${cor.headline_reason}${decay}`;
 }
@@ -90,7 +90,7 @@ export function sticking(cluster) {
 /** How fast a gas slows the beads, and what is to be said of it. */
 export function drag(cor) {
   if (!cor || !known(cor.drag)) return ['', 'not known yet'];
-  const show = (value) => value.toFixed(cor.drag_error >= 0.01 ? 3 : 4);
+  const show = (value) => fixed(value, cor.drag_error >= 0.01 ? 3 : 4);
   const error = give(cor.drag_error, show, ', ');
   return [`${show(cor.drag)} 1/s`, `${error}part of its speed that a bead in flight loses each second`];
 }

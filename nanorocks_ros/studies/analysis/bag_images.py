@@ -125,8 +125,8 @@ class PreprocessedFrames:
         if self._stage.view is not None:
             return []
         return [
-            f'{self._bag.where}: no camera_info and no calibration file; the picture is taken as '
-            'straight'
+            f'{self._bag.where}: neither camera_info nor a calibration file; the lens is taken as '
+            'free of distortion'
         ]
 
     def shots(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Interval
 
-_LETTERS = 112
+_LETTERS, _NO_BREAK = 112, '\N{NO-BREAK SPACE}'
 _NEEDED = 'time', 'cycle', 'status', 'relation', 'restitution', 'headline'
 _ALONE = ('joint', 'decay', 'contact')
 _NAMES = {'joint': 'both together', 'decay': 'decay alone', 'contact': 'contacts alone'}
@@ -103,7 +103,16 @@ def published_lines(cors: list[CorEstimate], truth: Truth | None = None) -> list
         lines += _other_lines(cors[0])
     if truth is not None:
         lines.append(f'truth: beads {truth.beads:g}, walls {truth.walls:g}')
-    return [part for line in lines for part in textwrap.wrap(line, _LETTERS)]
+    return [part for line in lines for part in _wrapped(line)]
+
+
+def _wrapped(line: str) -> list[str]:
+    """A line in parts, broken after semicolons where that is enough."""
+    unbroken = '; '.join(part.replace(' ', _NO_BREAK) for part in line.split('; '))
+    parts = textwrap.wrap(unbroken, _LETTERS, break_long_words=False)
+    if any(len(part) > _LETTERS for part in parts):
+        parts = textwrap.wrap(line, _LETTERS)
+    return [part.replace(_NO_BREAK, ' ') for part in parts]
 
 
 def published_text(cors: list[CorEstimate]) -> str:

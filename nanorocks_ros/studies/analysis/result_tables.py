@@ -6,6 +6,7 @@ Tested by ``test/studies/analysis/test_long_term.py``.
 from __future__ import annotations
 
 import csv
+import shlex
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +37,13 @@ def trays_of(folder: Path, table: str) -> tuple[int, ...]:
     names = (path.stem.split('_') for path in folder.glob(f'tray_*_{table}.csv'))
     trays = tuple(sorted(int(name[1]) for name in names if len(name) == 3 and name[1].isdigit()))
     if not trays:
-        raise RecordingError(str(folder), f'holds no tray_K_{table}.csv', _FORM)
+        # As by `nanorocks measure`, whose decays have a folder each.
+        below = min((path.parent for path in folder.rglob(f'tray_*_{table}.csv')), default=None)
+        raise RecordingError(
+            str(folder),
+            f'holds no tray_K_{table}.csv',
+            _FORM if below is None else f'name {shlex.quote(str(below))}',
+        )
     return trays
 
 

@@ -30,7 +30,7 @@ _MAX_IMAGES = 31
 _MIN_CONTRAST = 2.5
 _MIN_VISIBLE_SHARE = 0.6
 MAX_RESIDUAL_PX = 0.5
-_GREEN, _RED, _WHITE = (60, 220, 60), (60, 60, 240), (255, 255, 255)
+_GREEN, _RED, _WHITE, _BLACK = (60, 220, 60), (60, 60, 240), (255, 255, 255), (0, 0, 0)
 
 
 def calibrate(
@@ -153,7 +153,8 @@ def draw_calibration(picture: NDArray[np.uint8], calibration: Calibration) -> ND
         # Lines are drawn on pixels; a region ends between two pixels.
         cv2.rectangle(canvas, corners[0], (corners[1][0] - 1, corners[1][1] - 1), _GREEN, 1)
         at = (region.x + 4, region.y - 8)
-        cv2.putText(canvas, f'tray {number}', at, 0, 0.6, _GREEN, 1, cv2.LINE_AA)
+        for colour, thickness in ((_BLACK, 3), (_GREEN, 1)):
+            cv2.putText(canvas, f'tray {number}', at, 0, 0.6, colour, thickness, cv2.LINE_AA)
     _draw_scale(canvas, calibration.pixels_per_metre)
     return canvas
 

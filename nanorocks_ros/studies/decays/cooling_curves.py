@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.outputs.csv_tables import number, read_csv
+from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, read_curve
 
 if TYPE_CHECKING:
@@ -69,6 +71,9 @@ def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
         raise RecordingError(str(path), 'does not exist', _FORM)
     if not path.is_dir():
         parts = path.stem.split('_')
+        if path.suffix.lower() in VIDEO_SUFFIXES:
+            first = f'analyse it first: nanorocks analyse {shlex.quote(str(path))}'
+            raise RecordingError(str(path), 'is a film, no table of speeds', first)
         has_number = parts[:1] == ['tray'] and len(parts) > 1 and parts[1].isdigit()
         own = int(parts[1]) if has_number else None
         if own is not None and tray not in (None, own):

@@ -185,6 +185,6 @@ def draw_species(axes: Axes, energies: Sequence[SpeciesEnergy], origin: float = 
 
 def _fit_text(fit: HaffFit) -> str:
     return (
-        f'v0 {fit.initial_speed * _MM:.2f} ± {fit.initial_speed_error * _MM:.2f} mm/s, '
-        f'tau {fit.haff_time:.2f} ± {fit.haff_time_error:.2f} s'
+        f'$v_0$ = {fit.initial_speed * _MM:.2f} ± {fit.initial_speed_error * _MM:.2f} mm/s, '
+        rf'$\tau$ = {fit.haff_time:.2f} ± {fit.haff_time_error:.2f} s'
     )

@@ -185,7 +185,7 @@ def _draw_bands(axes: Axes, panel: _Panel, axis: NDArray[np.float64]) -> None:
         low, middle, high = panel.law.exponent.quantiles(_ENDS)
         label = (
             f'1 − restitution as speed to the power of {middle:.2f} [{low:.2f}, {high:.2f}], '
-            f'95 % band; chance of a constant one {panel.law.chance:.2g}'
+            f'95 % band; chance that it is constant: {panel.law.chance:.2g}'
         )
         axes.fill_between(axis, band[0], band[2], color=_LAW, alpha=0.2, lw=0)
         axes.plot(axis, band[1], color=_LAW, lw=1.4, label=label)
@@ -208,7 +208,7 @@ def _draw_paper(axes: Axes, tray: int) -> None:
             [value, value],
             color=PAPER,
             lw=2.2,
-            label=f'paper: narrow above {narrow:g} mm/s, up to '
+            label=f'the same: little scatter above {narrow:g} mm/s, values up to '
             f'{reported.PAPER_HIGHEST_RESTITUTION:g} below',
         )
     axes.set_xlim(left, right)

@@ -19,6 +19,7 @@ from nanorocks_ros.outputs.unfinished_files import unfinished_folder
 from nanorocks_ros.recordings.bag.find_bags import is_recording
 from nanorocks_ros.recordings.film.image_folder import images_in
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
+from nanorocks_ros.studies.results.results_folders import holds_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +48,7 @@ class CachedFilm(NamedTuple):
 
 
 def is_film(path: Path) -> bool:
-    """Whether a path is a video or a folder of images, and not a recording.
+    """Whether a path is a video or a folder of images, and neither a recording nor results.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def is_film(path: Path) -> bool:
         If it cannot be read.
     """
     if path.is_dir():
-        return not is_recording(path) and bool(images_in(path))
+        return not is_recording(path) and bool(images_in(path)) and not holds_results(path)
     if not path.is_file() or is_recording(path):
         return False
     return path.suffix.lower() in VIDEO_SUFFIXES or looks_like_film(path)

@@ -15,6 +15,7 @@ from nanorocks_ros.recordings.film.video import Video
 from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
 from nanorocks_ros.records import NS
 from nanorocks_ros.studies.film_import.find_films import films_in_folder
+from nanorocks_ros.studies.results.results_folders import refuse_results
 from nanorocks_ros.studies.synthetic.film_bag import check_quality
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ def open_film(path: Path, settings: ImportSettings) -> Film:
     try:
         if not path.exists():
             raise RecordingError(str(path), 'does not exist', 'pass a video or a folder of images')
+        refuse_results(path)
         if not path.is_dir():
             return Video(path, settings.rate, settings.threads)
         if images_in(path):

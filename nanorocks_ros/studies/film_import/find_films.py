@@ -12,6 +12,7 @@ from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.recordings.film.image_folder import IMAGE_SUFFIXES, images_in
 from nanorocks_ros.recordings.film.natural_sort import SYSTEM_FOLDERS, natural_key
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
+from nanorocks_ros.studies.results.results_folders import holds_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,6 +91,8 @@ def films_in_folder(folder: Path) -> FoundFilms:
         if path.name.startswith('.') or path.name in SYSTEM_FOLDERS:
             continue
         try:
+            if holds_results(path):
+                continue
             if bool(images_in(path)) if path.is_dir() else path.suffix.lower() in VIDEO_SUFFIXES:
                 result.films.append(path)
             elif path.suffix.lower() in IMAGE_SUFFIXES or looks_like_film(path):

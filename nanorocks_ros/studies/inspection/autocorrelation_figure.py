@@ -87,7 +87,7 @@ def _draw_snapshot(row: NDArray[np.object_], snapshot: Snapshot, scale: float) -
     row[1].set_ylim(reach, -reach)
     row[1].set_title('autocorrelation')
     row[1].set_xlabel('shift in x [mm]')
-    row[1].set_ylabel('in y [mm]')
+    row[1].set_ylabel('shift in y [mm]')
 
 
 def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
@@ -117,5 +117,6 @@ def _draw_sizes(axes: Axes, tray: CycleClusters) -> None:
     plain_numbers(axes.yaxis)
     axes.set_xlabel('time since the shaking event [s]')
     axes.set_ylabel('cluster size, mean over beads [beads]')
-    axes.legend(loc='upper left')
+    # The lines of the onsets end below the words.
+    axes.legend(loc='upper left', frameon=True, framealpha=1.0, edgecolor='none')
     axes.grid(alpha=0.25, which='major')

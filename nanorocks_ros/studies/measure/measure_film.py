@@ -14,6 +14,7 @@ from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
+from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
 from nanorocks_ros.studies.analysis.tray_words import tray_lines
@@ -135,6 +136,7 @@ def _tracked(plan: MeasurePlan, teller: Teller) -> TrackedBag:
         tracked = track_bag(
             plan.bag, plan.settings, image_topic=plan.image_topic, progress=progress
         )
+    tracked = replace(tracked, notices=[plan.name_files(notice) for notice in tracked.notices])
     for notice in tracked.notices:
         teller.say(notice)
     write_tracks(plan.folder / TRACKS, tracked, described=False)
@@ -208,7 +210,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     """What the decay of the speeds says, or why it is not read."""
     reason = step.reason_against
     if reason:
-        return [f'{DECAY_NOT_READ}; {reason}']
+        return [f'{DECAY_NOT_READ}; {reason}{_of_an_earlier_call(plan, step.tray.number)}']
     number = step.tray.number
     key = tracking_key(plan.bag, plan.settings, plan.image_topic)
     note = plan.folder / f'tray_{number}_decay.json'
@@ -230,6 +232,14 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     ]
     write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())
     return lines
+
+
+def _of_an_earlier_call(plan: MeasurePlan, number: int) -> str:
+    """What is said of results of the decay that an earlier call left."""
+    folder = plan.folder / f'tray_{number}'
+    if not (folder / RESULTS_MARK).is_file():
+        return ''
+    return f'; {folder} is of an earlier call, which was told more'
 
 
 def _noted(note: Path) -> dict[str, Any]:

@@ -216,7 +216,7 @@ BAD = {
     'nothing.mcap': (b'', 'is empty (0 bytes)'),
     'magic.mcap': (b'\x89PNG\r\n\x1a\n' + bytes(99), 'is not an MCAP file'),
     'one.bag': (b'#ROSBAG V2.0\n' + bytes(99), 'is a ROS 1 bag; convert it first'),
-    'text.txt': (b'no bag at all', 'is not a bag'),
+    'text.txt': (b'no bag at all', ' a bag; '),
     'broken.db3': (b'SQLite format 3\x00' + bytes(999), 'cannot be read as a recording'),
 }
 
