@@ -130,27 +130,36 @@ def difference(actual: dict[str, str], wanted: dict[str, str]) -> list[str]:
     return lines
 
 
-def kill_at_each_step(job: Callable[[], object], folder: Path) -> tuple[int, list[str]]:
+def kill_at_each_step(
+    job: Callable[[], object], folder: Path, before: Path | None = None
+) -> tuple[int, list[str]]:
     """Kill a job before each of its steps, run it again, and compare with a run without a kill.
 
     Parameters
     ----------
     job : callable
     folder : Path
-        Where it writes; empty, and emptied before each kill.
+        Where it writes; emptied before each kill.
+    before : Path, optional
+        A folder of what lies there when the job begins; by default nothing.
 
     Returns
     -------
     int, list of str
         The number of kills, and what differed after the second run, one line each.
     """
+
+    def prepare() -> None:
+        shutil.rmtree(folder)
+        folder.mkdir() if before is None else shutil.copytree(before, folder)
+
+    prepare()
     code, steps = run_until(job, folder)
     wanted, lines = digests(folder), []
     if code:
         lines.append(f'without a kill: exit code {code}')
     for step, path in enumerate(steps, 1):
-        shutil.rmtree(folder)
-        folder.mkdir()
+        prepare()
         killed, _ = run_until(job, folder, step)
         code, _ = run_until(job, folder)
         differing = difference(digests(folder), wanted)

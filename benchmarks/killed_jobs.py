@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.file_steps import difference, digests
 from benchmarks.killed_job_files import (
     arrays_of,
     messages_of,
@@ -22,6 +23,7 @@ from benchmarks.killed_job_files import (
     write_bag,
     write_film,
 )
+from nanorocks_ros.jobs.resumed_tasks import parts_folder
 from nanorocks_ros.recordings.bag.reader import open_bag
 
 if TYPE_CHECKING:
@@ -98,27 +100,40 @@ class _Recording:
         loss = (stamps[-1] - (read[-1] if read else stamps[0])) / 1e9
         return read == stamps[: len(read)] and loss <= _LONGEST_LOSS_S, loss
 
+    def keep(self, folder: Path) -> None:
+        """Copy the recording."""
+        shutil.copytree(self._bag, folder / 'bag')
+
 
 class _Resumed:
     """A command that is killed, run again, and compared with one that was not.
 
     Parameters
     ----------
+    folder : Path
+        Its outputs lie in ``killed``; what they should be in ``wanted``.
     command : list of str
         OUTPUT stands for its output.
     fingerprint : callable
-        Of the output, so that equal ones are bit-identical.
+        Of the output, so that equal ones are bit-identical. Names of files, hidden ones too, are
+        always compared.
     """
 
     def __init__(
         self, folder: Path, command: list[str], fingerprint: Callable[[Path], str]
     ) -> None:
         self._command, self._fingerprint = command, fingerprint
-        self._output = folder / 'output'
+        self._killed, self._whole = folder / 'killed', folder / 'wanted'
+        self._output = self._killed / 'output'
+        self._killed.mkdir()
         began = time.monotonic()
         self._run()
         self._seconds = time.monotonic() - began
-        self._wanted = fingerprint(self._output)
+        self._wanted = self._state()
+        shutil.copytree(self._killed, self._whole)
+
+    def _state(self) -> tuple[str, list[str]]:
+        return self._fingerprint(self._output), sorted(digests(self._killed))
 
     def _filled(self) -> list[str]:
         return [word.replace('OUTPUT', str(self._output)) for word in self._command]
@@ -127,8 +142,15 @@ class _Resumed:
         subprocess.run(self._filled(), check=True, capture_output=True)
 
     def _clear(self) -> None:
-        for path in self._output.parent.glob(f'*{self._output.stem}*'):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        shutil.rmtree(self._killed)
+        self._killed.mkdir()
+
+    def keep(self, folder: Path) -> None:
+        """Copy what the last kill led to, and what it should be."""
+        for source in (self._killed, self._whole):
+            shutil.copytree(source, folder / source.name)
+        lines = difference(digests(self._killed), digests(self._whole))
+        (folder / 'differences.txt').write_text('\n'.join(lines))
 
     def kill(self, random: np.random.Generator) -> tuple[bool, None]:
         self._clear()
@@ -140,7 +162,7 @@ class _Resumed:
         except subprocess.CalledProcessError as error:
             print(error.stderr.decode(), file=sys.stderr)
             return False, None
-        return self._fingerprint(self._output) == self._wanted, None
+        return self._state() == self._wanted, None
 
     def _make_room(self) -> None:
         """What the user does before the same command is called again: nothing."""
@@ -157,8 +179,10 @@ class _Simulations(_Resumed):
         super().__init__(folder, command, arrays_of)
 
     def _make_room(self) -> None:
-        # It was finished before the kill: an existing file is not replaced.
-        self._output.with_suffix('.npz').unlink(missing_ok=True)
+        # It was finished before the kill, its parts too: an existing file is not replaced.
+        output = self._output.with_suffix('.npz')
+        if not parts_folder(output).exists():
+            output.unlink(missing_ok=True)
 
 
 class _Sweep(_Simulations):
@@ -202,7 +226,7 @@ class _Salvage(_Resumed):
         if self._output.exists():
             files = list(self._output.glob('*.mcap'))
             unfinished = not files or not open_bag(self._output).complete
-            assert unfinished or self._fingerprint(self._output) == self._wanted
+            assert unfinished or self._fingerprint(self._output) == self._wanted[0]
             shutil.rmtree(self._output)
 
 

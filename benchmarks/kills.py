@@ -25,6 +25,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog='benchmarks kills', description=__doc__.splitlines()[0])
     parser.add_argument('--count', type=int, default=20, help='kills of all jobs together')
     parser.add_argument('--journal', help='file of outcomes, to which this call adds')
+    parser.add_argument('--keep', help='folder for outputs that are not as they should be')
     options = parser.parse_args(arguments)
     done = journal.read(options.journal)
     jobs: dict[str, Job] = {}
@@ -37,6 +38,9 @@ def main(arguments: Sequence[str]) -> int:
                 if name not in jobs:
                     jobs[name] = JOBS[name](Path(folder) / name)
                 done[number] = [name, *jobs[name].kill(generator_of('kills', number))]
+                if options.keep and not done[number][1]:
+                    (Path(options.keep) / str(number)).mkdir(parents=True)
+                    jobs[name].keep(Path(options.keep) / str(number))
                 journal.note(options.journal, number, done[number])
     except KeyboardInterrupt:
         print('interrupted; the same command continues', file=sys.stderr)

@@ -87,6 +87,10 @@ class Journal:
         """Keys of the parts, whether they can be read or not."""
         return [path.stem for path in self._paths()]
 
+    def newest_ns(self) -> int:
+        """When the newest part was written, [ns]; 0 without parts."""
+        return max((path.stat().st_mtime_ns for path in self._paths()), default=0)
+
     def intact_keys(self) -> list[str]:
         """Keys of the parts that can be read; deletes damaged parts and notes them in `notices`.
 

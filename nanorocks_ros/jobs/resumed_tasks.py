@@ -5,8 +5,10 @@ from __future__ import annotations
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
+from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.journal import Journal
 from nanorocks_ros.jobs.tasks import as_completed
+from nanorocks_ros.outputs.npz_archive import read_archive
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -22,6 +24,37 @@ Argument = TypeVar('Argument')
 def parts_folder(output: Path) -> Path:
     """Folder that keeps the finished parts of a job until its output is complete."""
     return output.with_name(f'{output.name}.parts')
+
+
+def delete_parts_of_finished(output: Path, specification: str) -> bool:
+    """Delete the parts that a kill left beside a complete output.
+
+    Parameters
+    ----------
+    output : Path
+        An archive; its array ``made_by`` is the specification of its job.
+    specification : str
+        See `Journal`.
+
+    Returns
+    -------
+    bool
+        Whether there were such parts. Those of another job stay, those of one that runs, and
+        those that are newer than the output: a job that replaces it was interrupted.
+    """
+    folder = parts_folder(output)
+    if not folder.is_dir() or not output.is_file():
+        return False
+    try:
+        if str(read_archive(output).get('made_by', '')) != specification:
+            return False
+        with Journal(folder, specification) as journal:
+            if journal.newest_ns() > output.stat().st_mtime_ns:
+                return False
+            journal.delete()
+    except RecordingError:
+        return False
+    return not folder.exists()
 
 
 @contextmanager

@@ -13,7 +13,6 @@ import os
 import re
 import secrets
 import shutil
-import tempfile
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,9 +21,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_FOLDER = '.part-'
 _RANDOM_BYTES = 8
-_LONGEST_STEM = 100
+# A name may have 255 bytes.
+_LONGEST_STEM_BYTES = 100
+# What stood in the place of a folder.
+_EARLIER = 'earlier'
 _NAME = re.compile(rf'\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part(\.[^.]+)?', re.DOTALL)
 # Where the file system has no locks, files of this age have no process, [s].
 _OLD_S = 3600.0
@@ -51,11 +52,9 @@ def open_unfinished(path: Path) -> tuple[Path, int]:
     OSError
         When it cannot be made.
     """
-    stem = path.stem[:_LONGEST_STEM]
-    delete_unfinished(path.parent, stem, path.suffix)
+    delete_unfinished(path.parent, _stem(path.stem), path.suffix)
     while True:
-        name = f'.{stem}.{secrets.token_hex(_RANDOM_BYTES)}.part{path.suffix}'
-        part = path.parent / name
+        part = path.parent / _hidden_name(path.stem, path.suffix)
         lock = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
         with suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX)
@@ -66,12 +65,13 @@ def open_unfinished(path: Path) -> tuple[Path, int]:
 
 
 @contextmanager
-def unfinished_folder(parent: Path) -> Iterator[Path]:
-    """A new folder with a hidden name, deleted at the end; those of ended processes go first.
+def unfinished_folder(path: Path) -> Iterator[Path]:
+    """A new folder with a hidden name beside a path, deleted at the end.
 
     Parameters
     ----------
-    parent : Path
+    path : Path
+        The folder to be made. What killed processes left of the same path goes first.
 
     Yields
     ------
@@ -82,12 +82,10 @@ def unfinished_folder(parent: Path) -> Iterator[Path]:
     OSError
         When it cannot be made.
     """
-    for other in parent.glob(f'{_FOLDER}*'):
-        with _lock_of(other) as descriptor:
-            if descriptor is not None and _has_no_process(descriptor):
-                shutil.rmtree(other, ignore_errors=True)
+    delete_unfinished_folders(path.parent, path.name)
     while True:
-        folder = Path(tempfile.mkdtemp(prefix=_FOLDER, dir=parent))
+        folder = path.parent / _hidden_name(path.name)
+        folder.mkdir(0o700)
         with _lock_of(folder) as descriptor:
             if descriptor is None:
                 # Another process deleted it before the lock.
@@ -101,6 +99,47 @@ def unfinished_folder(parent: Path) -> Iterator[Path]:
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
             return
+
+
+def exchange_folder(folder: Path, fresh: Path, part: Path) -> None:
+    """Put a new folder in the place of one that there may be, which is deleted with `part`.
+
+    Parameters
+    ----------
+    folder, fresh : Path
+    part : Path
+        The `unfinished_folder` of `folder`. If the process is killed between the two steps, the
+        next one puts the earlier folder back.
+
+    Raises
+    ------
+    OSError
+        When a name cannot be changed.
+    """
+    if folder.exists():
+        folder.rename(part / _EARLIER)
+    fresh.rename(folder)
+
+
+def delete_unfinished_folders(parent: Path, name: str | None = None) -> None:
+    """Delete unfinished folders whose processes have ended.
+
+    Parameters
+    ----------
+    parent : Path
+    name : str, optional
+        Of the finished folder, which gets back what was taken from its place; by default any.
+    """
+    for part, its_stem, its_suffix in _unfinished(parent):
+        if name is not None and its_stem + its_suffix != _stem(name):
+            continue
+        with _lock_of(part) as descriptor:
+            if descriptor is None or not _has_no_process(descriptor):
+                continue
+            earlier = part / _EARLIER
+            if name and earlier.is_dir() and not os.path.lexists(parent / name):
+                earlier.rename(parent / name)
+            shutil.rmtree(part, ignore_errors=True)
 
 
 @contextmanager
@@ -155,6 +194,14 @@ def _unfinished(folder: Path) -> Iterator[tuple[Path, str, str]]:
         match = _NAME.fullmatch(name)
         if match:
             yield folder / name, match[1], match[2] or ''
+
+
+def _hidden_name(stem: str, suffix: str = '') -> str:
+    return f'.{_stem(stem)}.{secrets.token_hex(_RANDOM_BYTES)}.part{suffix}'
+
+
+def _stem(name: str) -> str:
+    return os.fsencode(name)[:_LONGEST_STEM_BYTES].decode('utf-8', 'ignore')
 
 
 def _delete_without_process(part: Path) -> None:

@@ -85,6 +85,15 @@ def test_a_link_or_a_pipe_with_such_a_name_does_not_block_and_its_target_stays(t
     assert (tmp_path / 'target').exists()
 
 
+def test_the_longest_name_in_letters_of_three_bytes_is_written(tmp_path):
+    # 255 bytes: one more and the file system refuses it.
+    path = tmp_path / ('漢' * 83 + 'ab.npz')
+    for content in (b'first', b'second'):
+        write_bytes(path, content)
+    assert path.read_bytes() == b'second'
+    assert names(tmp_path) == [path.name]
+
+
 def test_a_folder_with_unfinished_files_alone_holds_nothing(tmp_path):
     assert not holds_files(tmp_path)
     part, lock = open_unfinished(tmp_path / 'a.npz')

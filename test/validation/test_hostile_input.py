@@ -89,3 +89,17 @@ def test_a_killed_salvage_and_import_are_finished_by_the_same_command(tmp_path):
     for name in ('salvage', 'import --each'):
         job = killed_jobs.JOBS[name](tmp_path / name.split()[0])
         assert job.kill(generator_of('kills', 3)) == (True, None)
+
+
+def test_what_a_kill_led_to_is_kept_beside_what_it_should_be(tmp_path):
+    job = killed_jobs.JOBS['sweep'](tmp_path / 'sweep')
+    assert job.kill(generator_of('kills', 3)) == (True, None)
+    (tmp_path / 'sweep' / 'killed' / '.output.left').write_text('half')
+    (tmp_path / 'sweep' / 'killed' / 'output.npz').write_text('other')
+    job.keep(tmp_path)
+    assert (tmp_path / 'differences.txt').read_text().splitlines() == [
+        '.output.left is left over',
+        'output.npz has another content',
+    ]
+    assert (tmp_path / 'killed' / '.output.left').read_text() == 'half'
+    assert (tmp_path / 'wanted' / 'output.npz').stat().st_size > 1000

@@ -60,24 +60,28 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Film, measure, write and print, and return the exit code."""
+    from nanorocks_ros.cli.calibration.finished_output import is_finished
     from nanorocks_ros.cli.progress import Progress
-    from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key
+    from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key, load_curves
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.libraries.cluster_simulations import build_curves
 
     output = Path(options.output)
-    check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
     plan = _plan(options)
-    workers = Workers(processes=options.workers, scheduler=options.scheduler)
-    with Progress('films of clusters') as progress:
-        curves = build_curves(
-            plan,
-            output,
-            workers,
-            progress.count,
-            lambda text: print(f'nanorocks: {text}', file=sys.stderr),
-        )
+    if is_finished(options, plan.specification()):
+        curves = load_curves(str(output), packaged=False)
+    else:
+        check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
+        workers = Workers(processes=options.workers, scheduler=options.scheduler)
+        with Progress('films of clusters') as progress:
+            curves = build_curves(
+                plan,
+                output,
+                workers,
+                progress.count,
+                lambda text: print(f'nanorocks: {text}', file=sys.stderr),
+            )
     tray_curves = {number: curves[curve_key(plan.cells[number])] for number in plan.trays}
     if options.json:
         values = {str(number): _values(curve) for number, curve in tray_curves.items()}

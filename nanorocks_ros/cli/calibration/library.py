@@ -58,15 +58,16 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate, write and print, and return the exit code."""
+    from nanorocks_ros.cli.calibration.finished_output import is_finished
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
+    from nanorocks_ros.inference.decay.decay_library_file import load_library
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.libraries.decay_simulations import build_library
     from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan
 
     output = Path(options.output)
-    check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
     plan = LibraryPlan(
         tray=tray_by_number(load_trays(options.trays_file or None), options.tray),
         nodes=options.nodes,
@@ -76,15 +77,19 @@ def run(options: argparse.Namespace) -> int:
         drag=options.drag,
         law=_law(options),
     )
-    workers = Workers(processes=options.workers, scheduler=options.scheduler)
-    with Progress(f'decays of tray {options.tray}') as progress:
-        library = build_library(
-            plan,
-            output,
-            workers,
-            progress.count,
-            lambda text: print(f'nanorocks: {text}', file=sys.stderr),
-        )
+    if is_finished(options, plan.specification()):
+        library = load_library(str(output), packaged=False)
+    else:
+        check_outputs({'--output': output}, {'--output': ('.npz',)}, force=options.force)
+        workers = Workers(processes=options.workers, scheduler=options.scheduler)
+        with Progress(f'decays of tray {options.tray}') as progress:
+            library = build_library(
+                plan,
+                output,
+                workers,
+                progress.count,
+                lambda text: print(f'nanorocks: {text}', file=sys.stderr),
+            )
     if options.json:
         summary = {'output': str(output), 'misfit': library.misfit, **json.loads(library.made_by)}
         print(json.dumps(summary))

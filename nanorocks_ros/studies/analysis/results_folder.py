@@ -7,8 +7,8 @@ import itertools
 import os
 import re
 import shutil
+from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +17,11 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
 from nanorocks_ros.outputs.table_files import PACKAGE, write_package, write_table
+from nanorocks_ros.outputs.unfinished_files import (
+    delete_unfinished_folders,
+    exchange_folder,
+    unfinished_folder,
+)
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
@@ -55,6 +60,8 @@ _NEVER_NS = np.iinfo(np.int64).max
 def check_results_folder(folder: Path) -> Path:
     """Check, before hours of work, that a folder can take results.
 
+    What a killed process left of it is deleted, and earlier results are put back in their place.
+
     Returns
     -------
     Path
@@ -65,6 +72,12 @@ def check_results_folder(folder: Path) -> Path:
     RecordingError
         When it holds something else.
     """
+    if folder.name in ('', '..'):
+        raise RecordingError(
+            str(folder), 'is named by its place alone', f'pass --output {folder.resolve()}'
+        )
+    with suppress(OSError):
+        delete_unfinished_folders(folder.parent, folder.name)
     if folder.exists() and not (folder / RESULTS_MARK).is_file():
         raise RecordingError(
             str(folder), 'exists and holds no results of ours', 'pass another --output'
@@ -113,8 +126,8 @@ def write_results(
     check_results_folder(folder)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f'.{folder.name}.', dir=folder.parent) as scratch:
-            fresh = Path(scratch) / 'fresh'
+        with unfinished_folder(folder) as part:
+            fresh = part / 'fresh'
             fresh.mkdir()
             (fresh / RESULTS_MARK).touch()
             _write_tables(analysis, fresh, source, settings, form)
@@ -124,8 +137,7 @@ def write_results(
                 more(fresh)
             if folder.exists():
                 _keep_others(folder, fresh)
-                folder.rename(Path(scratch) / 'earlier')
-            fresh.rename(folder)
+            exchange_folder(folder, fresh, part)
     except OSError as error:
         raise UnwritableError(
             str(folder), f'cannot be written: {error.strerror}', 'pass a writable --output'

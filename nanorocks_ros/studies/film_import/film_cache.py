@@ -15,7 +15,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
-from nanorocks_ros.outputs.unfinished_files import unfinished_folder
+from nanorocks_ros.outputs.unfinished_files import delete_unfinished_folders, unfinished_folder
 from nanorocks_ros.recordings.bag.find_bags import is_recording
 from nanorocks_ros.recordings.film.image_folder import images_in
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES, looks_like_film
@@ -90,7 +90,9 @@ def cached_import(film: Path, progress: Callable[[float], None]) -> CachedFilm:
     frames = known.get('frames')
     if known.get('film') == state and isinstance(frames, int) and bag.is_dir():
         return CachedFilm(bag, frames, (), reused=True)
-    with unfinished_folder(folder) as part:
+    # Of other films, too.
+    delete_unfinished_folders(folder)
+    with unfinished_folder(bag) as part:
         imported = import_films([film], part / bag.name, ImportSettings(), progress)
         with suppress(FileNotFoundError):
             record.unlink()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.inference.decay.decay_library_file import library_of
+from nanorocks_ros.jobs.resumed_tasks import delete_parts_of_finished
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results_folder import write_results
@@ -126,6 +127,8 @@ def _library(plan: _Plan, step: DecayStep, teller: _Teller) -> str:
     """The library of the settings, of the package, or of an earlier run; else a new one."""
     told = step.settings.cooling.decay_library
     own = plan.folder / f'tray_{step.tray.number}_library.npz'
+    library_plan = LibraryPlan(tray=step.tray, nodes=_NODES, rough_nodes=_ROUGH_NODES, runs=_RUNS)
+    delete_parts_of_finished(own, library_plan.specification())
     for path in (told,) if told else ('', str(own)):
         try:
             library_of(step.tray, path)
@@ -134,7 +137,6 @@ def _library(plan: _Plan, step: DecayStep, teller: _Teller) -> str:
                 raise
         else:
             return path
-    library_plan = LibraryPlan(tray=step.tray, nodes=_NODES, rough_nodes=_ROUGH_NODES, runs=_RUNS)
     teller.say(
         f'library: the decay is compared with simulations of this tray, made once, in {own}; the '
         'same command continues if it is interrupted'

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.file_steps import kill_at_each_step, run_until, was_killed
+from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.csv_tables import number
 from nanorocks_ros.outputs.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.reader import open_bag
@@ -23,7 +27,11 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import FORMATS, write_results
+from nanorocks_ros.studies.analysis.results_folder import (
+    FORMATS,
+    check_results_folder,
+    write_results,
+)
 from nanorocks_ros.studies.analysis.results_json import as_json, last_of_each_cycle
 from nanorocks_ros.studies.results.record_columns import columns_of
 from nanorocks_ros.wire import topics
@@ -97,6 +105,64 @@ def test_tables_in_parquet_hold_the_numbers_of_the_csv(tmp_path):
         else:
             np.testing.assert_equal(value, number(row[column.name]))
     assert json.loads(table.schema.metadata[b'provenance'])['source'] == 'bag'
+
+
+@pytest.mark.parametrize('earlier', [False, True])
+def test_results_are_written_again_after_a_kill_at_any_step_and_nothing_is_left(tmp_path, earlier):
+    before, folder = tmp_path / 'before', tmp_path / 'here'
+    before.mkdir()
+    folder.mkdir()
+    if earlier:
+        write_results(analysis(), before / 'out', tmp_path / 'bag', PipelineSettings())
+        (before / 'out' / 'notes.txt').write_text('mine')
+    kills, differences = kill_at_each_step(
+        lambda: write_results(analysis(), folder / 'out', tmp_path / 'bag', PipelineSettings()),
+        folder,
+        before,
+    )
+    assert differences == []
+    assert kills > 10
+    assert os.listdir(folder) == ['out']
+    assert (folder / 'out' / 'notes.txt').exists() == earlier
+
+
+def test_earlier_results_are_back_before_the_work_begins_again(tmp_path):
+    folder = tmp_path / 'here'
+    folder.mkdir()
+
+    def job():
+        write_results(analysis(), folder / 'out', tmp_path / 'bag', PipelineSettings())
+
+    job()
+    (folder / 'out' / 'notes.txt').write_text('mine')
+    code, steps = run_until(job, folder, r'os\.rename .*/fresh$')
+    assert was_killed(code), steps
+    assert not (folder / 'out').exists()
+    check_results_folder(folder / 'out')
+    assert (folder / 'out' / 'notes.txt').read_text() == 'mine'
+    assert os.listdir(folder) == ['out']
+
+
+def test_unfinished_results_of_another_folder_stay(tmp_path):
+    for name in ('other', 'out'):
+        code, _ = run_until(
+            lambda name=name: write_results(
+                analysis(), tmp_path / name, tmp_path / 'bag', PipelineSettings()
+            ),
+            tmp_path,
+            r'os\.rename .*/fresh$',
+        )
+        assert was_killed(code)
+    check_results_folder(tmp_path / 'out')
+    (left,) = os.listdir(tmp_path)
+    assert left.startswith('.other.')
+
+
+def test_a_folder_without_a_name_is_refused_before_the_work(tmp_path, monkeypatch):
+    write_results(analysis(), tmp_path / 'out', tmp_path / 'bag', PipelineSettings())
+    monkeypatch.chdir(tmp_path / 'out')
+    with pytest.raises(RecordingError, match=r'pass --output /.*/out$'):
+        check_results_folder(Path())
 
 
 def full_analysis():
