@@ -255,7 +255,7 @@ def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
         return None
     index.counts = Counter(statistics.channel_message_counts)
     index.stated = statistics.message_count
-    if not is_consistent(index, statistics, size):
+    if not is_consistent(index.blocks, index.catalogue, statistics, size):
         return None
     if statistics.message_count:
         index.start_ns = statistics.message_start_time

@@ -14,26 +14,30 @@ if TYPE_CHECKING:
     from mcap.records import Statistics
 
     from nanorocks_ros.recordings.mcap.mcap_blocks import Block
-    from nanorocks_ros.recordings.mcap.mcap_index import McapIndex
+    from nanorocks_ros.recordings.mcap.mcap_catalogue import Catalogue
 
 
-def is_consistent(index: McapIndex, statistics: Statistics, size: int) -> bool:
+def is_consistent(
+    blocks: list[Block], catalogue: Catalogue, statistics: Statistics, size: int
+) -> bool:
     """Whether chunks, counts and times of an index agree.
 
     Parameters
     ----------
-    index : McapIndex
+    blocks : list of Block
+    catalogue : Catalogue
     statistics : Statistics
     size : int, [bytes]
         Of the file.
     """
+    counts = statistics.channel_message_counts
     return (
-        index.counts.total() == statistics.message_count
-        and set(index.counts) <= set(index.catalogue.channels)
-        and _lie_apart(index.blocks, size)
-        and (bool(index.blocks) or not statistics.message_count)
+        sum(counts.values()) == statistics.message_count
+        and set(counts) <= set(catalogue.channels)
+        and _lie_apart(blocks, size)
+        and (bool(blocks) or not statistics.message_count)
         and statistics.message_end_time <= LAST_NS
-        and _has_these_times(index.blocks, statistics)
+        and _has_these_times(blocks, statistics)
     )
 
 
