@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.cli.remedies import about_own_recording, results_beside, with_own_files
 from nanorocks_ros.errors import NanorocksError
 
@@ -82,7 +83,6 @@ def run(options: argparse.Namespace) -> int:
 def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
     """Say how films of unknown beads are measured: they do not tell which trays they show."""
     from nanorocks_ros.cli.flags import told_settings
-    from nanorocks_ros.outputs.safe_text import printable
 
     if told_settings(options, options.parameters) & {'trays', 'trays_file'}:
         return
@@ -92,7 +92,7 @@ def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
         f'another: nanorocks analyse {name} --trays 3; or measure a film of your own, with the '
         f'diameter of a bead in px: nanorocks measure {name} --diameter-px 31 -o {folder}'
     )
-    print(f'nanorocks: {printable(text)}', file=sys.stderr)
+    tell(text)
 
 
 def _run_one(options: argparse.Namespace) -> int:
@@ -126,7 +126,7 @@ def _run_one(options: argparse.Namespace) -> int:
         except NanorocksError as unwritten:
             error = unwritten
     for notice in analysis.notices:
-        print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
+        tell(with_own_files(notice, options))
     if options.json:
         values = about_own_recording(as_json(analysis), options)
         print(json.dumps(values, allow_nan=False))

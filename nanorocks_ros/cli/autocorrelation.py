@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.outputs.json_values import json_values
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
     for notice in (*assumed, *clusters.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)
     if '--table' in files:
         write_clusters(files['--table'], clusters)
     if '--output' in files:

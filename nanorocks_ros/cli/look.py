@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import finite_or_none
 
@@ -69,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
     for notice in (*assumed, *steps.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)
     if options.json:
         print(json.dumps(_as_json(steps), allow_nan=False))
     else:

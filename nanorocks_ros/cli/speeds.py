@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import json_values
 
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('nothing was written') from interruption
     for notice in (*assumed, *speeds.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)
     cycle = _cycle(speeds, options.cycle)
     if options.json:
         print(json.dumps(_as_json(speeds), allow_nan=False))

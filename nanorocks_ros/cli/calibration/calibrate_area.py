@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.outputs.json_values import finite_or_none
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         *calibration.notices,
         *(str(error) for error in calibration.refused.values()),
     ):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)
     if options.json:
         print(json.dumps(_as_json(calibration), allow_nan=False))
     else:

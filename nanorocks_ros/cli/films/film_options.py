@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.cli.notices import tell
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -89,4 +90,4 @@ def use_described_film(options: argparse.Namespace, bag: Path) -> tuple[str, ...
 def print_notices(notices: tuple[str, ...]) -> None:
     """Print notices for the user, one line each."""
     for notice in notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)

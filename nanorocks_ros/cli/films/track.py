@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.outputs.json_values import json_values
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def tracked_bag(options: argparse.Namespace) -> TrackedBag:
             Path(options.bag), settings, image_topic=options.image_topic, progress=progress.count
         )
     for notice in (*assumed, *bag.notices):
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)
     return bag
 
 
