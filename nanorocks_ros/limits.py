@@ -98,7 +98,7 @@ _MIB = 1 << 20
 
 CHUNK_BYTES = Limit(
     name='chunk_bytes',
-    default=256 * _MIB,
+    default=128 * _MIB,
     unit='bytes',
     quantity='a chunk or message of a recording, unpacked',
 )
@@ -113,6 +113,18 @@ CHUNK_MESSAGES = Limit(
     default=1_000_000,
     unit='messages',
     quantity='messages in a chunk of a recording',
+)
+RECORD_RATIO = Limit(
+    name='record_ratio',
+    default=1,
+    unit='for each byte of it',
+    quantity='messages and other records in a chunk of more than 1,000',
+)
+OVERLAP_BYTES = Limit(
+    name='overlap_bytes',
+    default=256 * _MIB,
+    unit='bytes',
+    quantity='chunks of a recording that overlap in time, unpacked',
 )
 SUMMARY_BYTES = Limit(
     name='summary_bytes',
@@ -204,6 +216,8 @@ LIMITS = (
     CHUNK_BYTES,
     CHUNK_RATIO,
     CHUNK_MESSAGES,
+    RECORD_RATIO,
+    OVERLAP_BYTES,
     SUMMARY_BYTES,
     HOLE_BYTES,
     SQLITE_STEPS,

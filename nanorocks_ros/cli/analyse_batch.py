@@ -14,6 +14,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.safe_text import counted, printable
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, priors_in_words
@@ -254,7 +255,7 @@ def _interval(values: tuple[float | None, ...], factor: float, digits: int) -> s
 
 
 def _notice(text: str) -> None:
-    print(f'nanorocks: {text}', file=sys.stderr)
+    tell(text)
 
 
 class _BatchProgress:

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.cli.notices import tell
+
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable
@@ -95,7 +97,7 @@ def _recording(name: str) -> str:
     except KeyboardInterrupt as interruption:
         raise KeyboardInterrupt('run the same command again to import the film') from interruption
     for notice in film.notices:
-        print(f'nanorocks: {printable(notice)}', file=sys.stderr)
+        tell(notice)
     how = 'its import is used' if film.reused else 'imported'
     print(
         f'nanorocks: {printable(name)}: {how}, {film.frames} frames in {printable(film.bag)}',

@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.cli.interrupts import Interrupts
+from nanorocks_ros.cli.notices import tell
 
 # All else is imported where an interruption is one line.
 if TYPE_CHECKING:
@@ -159,4 +160,4 @@ def _failed(error: Exception, options: argparse.Namespace | None) -> int:
 
 
 def _say(line: str) -> None:
-    print(f'nanorocks: {line}', file=sys.stderr)
+    tell(line)

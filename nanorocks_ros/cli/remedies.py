@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.outputs.named_recordings import with_commands, with_film
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def with_own_files(text: str, options: argparse.Namespace | None) -> str:
 def print_notices(notices: Iterable[str], options: argparse.Namespace) -> None:
     """Print notices for the user, one line each, with the user's own files in them."""
     for notice in notices:
-        print(f'nanorocks: {with_own_files(notice, options)}', file=sys.stderr)
+        tell(with_own_files(notice, options))
 
 
 def about_own_recording(values: Any, options: argparse.Namespace) -> Any:

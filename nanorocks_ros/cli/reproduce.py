@@ -6,10 +6,11 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 from __future__ import annotations
 
 import json
-import sys
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from nanorocks_ros.cli.notices import tell
 
 if TYPE_CHECKING:
     import argparse
@@ -141,4 +142,4 @@ class _Bars:
 
 
 def _notice(text: str) -> None:
-    print(f'nanorocks: {text}', file=sys.stderr)
+    tell(text)

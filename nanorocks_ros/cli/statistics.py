@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
+
 if TYPE_CHECKING:
     import argparse
 
@@ -99,10 +101,10 @@ def _measure(bag: TrackedBag, choices: GasChoices) -> dict[int, TrayStatistics]:
         except FitError as error:
             if len(bag.trays) == 1:
                 raise
-            print(f'nanorocks: {error}', file=sys.stderr)
+            tell(str(error))
             continue
         for notice in statistics[number].notices:
-            print(f'nanorocks: {notice}', file=sys.stderr)
+            tell(notice)
     if not statistics:
         raise FitError(
             'statistics', 'no tray has beads that move measurably', 'give an earlier start'

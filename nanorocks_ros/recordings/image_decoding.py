@@ -34,12 +34,16 @@ _GRAY = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
 _SPACES = {1: 'GRAY', 3: 'BGR'}
 
 
-def decoded_image(content: NDArray[np.uint8], *, gray: bool = False) -> NDArray[np.uint8] | None:
+def decoded_image(
+    content: NDArray[np.uint8], where: str = 'image', *, gray: bool = False
+) -> NDArray[np.uint8] | None:
     """Decode a compressed image as it is stored, whatever orientation its metadata tell.
 
     Parameters
     ----------
     content : ndarray of uint8, (bytes,)
+    where : str
+        Where it comes from, for errors.
     gray : bool
         Decode its brightness only.
 
@@ -54,7 +58,8 @@ def decoded_image(content: NDArray[np.uint8], *, gray: bool = False) -> NDArray[
         If it is larger than `IMAGE_PIXELS` allows.
     """
     image = _fast_jpeg(content, gray=gray)
-    return _by_opencv(content, _GRAY if gray else _AS_STORED) if image is None else image
+    flags = _GRAY if gray else _AS_STORED
+    return _by_opencv(content, where, flags) if image is None else image
 
 
 def _fast_jpeg(content: NDArray[np.uint8], *, gray: bool) -> NDArray[np.uint8] | None:
@@ -76,11 +81,11 @@ def _fast_jpeg(content: NDArray[np.uint8], *, gray: bool) -> NDArray[np.uint8] |
     return None
 
 
-def _by_opencv(content: NDArray[np.uint8], flags: int) -> NDArray[np.uint8] | None:
+def _by_opencv(content: NDArray[np.uint8], where: str, flags: int) -> NDArray[np.uint8] | None:
     try:
         image = cv2.imdecode(content, flags)
     except cv2.error as error:
         if is_too_large(error):
-            raise IMAGE_PIXELS.exceeded(None, FrameError, 'image') from error
+            raise IMAGE_PIXELS.exceeded(None, FrameError, where) from error
         return None
     return None if image is None else np.asarray(image, dtype=np.uint8)

@@ -53,3 +53,9 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_input_is_read(
     output = tmp_path / 'file' / 'bag'
     assert command.main([name, str(tmp_path / 'missing'), '-o', str(output)]) == 1
     assert 'is no folder; write elsewhere' in capsys.readouterr().err
+
+
+def test_line_ends_and_control_sequences_in_a_name_stay_on_one_line(tmp_path, capsys):
+    assert command.main(['info', str(tmp_path / 'a\n\x1b[2Jb.mcap')]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert r'a\n\x1b[2Jb.mcap: does not exist; ' in line

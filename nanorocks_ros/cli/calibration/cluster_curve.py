@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.cli.parsing.tray_options import add_tray, add_trays, add_trays_file
 from nanorocks_ros.outputs.json_values import finite_or_none
 
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
                 output,
                 workers,
                 progress.count,
-                lambda text: print(f'nanorocks: {text}', file=sys.stderr),
+                tell,
             )
     tray_curves = {number: curves[curve_key(plan.cells[number])] for number in plan.trays}
     if options.json:

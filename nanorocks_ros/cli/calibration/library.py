@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.cli.parsing.tray_options import add_tray, add_trays_file
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
                 output,
                 workers,
                 progress.count,
-                lambda text: print(f'nanorocks: {text}', file=sys.stderr),
+                tell,
             )
     if options.json:
         summary = {'output': str(output), 'misfit': library.misfit, **json.loads(library.made_by)}

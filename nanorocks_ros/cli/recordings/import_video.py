@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.flags import add_flag, flag_of, settings_from
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, rows
@@ -192,10 +193,9 @@ def _run_each(
 
 
 def _print_notices(imported: ImportResult) -> None:
-    from nanorocks_ros.outputs.safe_text import printable
 
     for notice in imported.notices:
-        print(f'nanorocks: {printable(notice)}', file=sys.stderr)
+        tell(notice)
 
 
 def _print_left_out(files: list[Path]) -> None:
@@ -215,10 +215,9 @@ def _print_failures(batch: ImportBatch) -> int:
     """Print the errors of a batch; returns the exit code."""
     if not batch.failed:
         return 0
-    from nanorocks_ros.outputs.safe_text import printable
 
     for error in batch.failed.values():
-        print(f'nanorocks: {printable(str(error))}', file=sys.stderr)
+        tell(str(error))
     total = len(batch.failed) + len(batch.imported) + len(batch.skipped)
     print(
         f'nanorocks: {len(batch.failed)} of {total} videos could not be imported, see above; '

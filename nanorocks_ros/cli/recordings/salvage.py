@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
+
+from nanorocks_ros.cli.notices import tell
 
 
 def add_parser(commands: Any) -> None:
@@ -34,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     with Progress('salvaging') as progress:
         result = salvage(Path(options.bag), Path(options.output), progress.count)
     for notice in result.notices:
-        print(f'nanorocks: {printable(notice)}', file=sys.stderr)
+        tell(notice)
     if options.json:
         values = {
             'messages_recovered': result.recovered,

@@ -25,6 +25,8 @@ from nanorocks_ros.recordings.storage import StorageFile
 _KINDS = 'a rosbag2 folder or an .mcap file; commands that measure take films as well'
 METADATA = 'metadata.yaml'
 ROS1_MAGIC = b'#ROSBAG V'
+# Missing files that are named.
+_NAMED_FILES = 5
 STORAGE_SUFFIXES = frozenset({'.mcap', '.db3'})
 
 
@@ -166,7 +168,7 @@ def _folder(path: Path, salvaging: bool) -> BagContents:
         metadata=_provenance(information),
         compressed_messages=_are_messages_compressed(information),
         notices=tuple(notices),
-        complete=len(files) == len(names),
+        complete=len(files) == _count_of_files(path, names),
         expected=count if type(count) is int and count >= 0 else None,
     )
 
@@ -230,14 +232,31 @@ def _refuse_compressed_files(path: Path, information: dict[str, Any]) -> None:
         )
 
 
+def _count_of_files(path: Path, names: list[str]) -> int:
+    """Number of files that a recording should have: a second name of a file does not count."""
+    present = [(path / name).stat() for name in names if (path / name).is_file()]
+    missing = len(names) - len(present)
+    return missing + len({(status.st_dev, status.st_ino) for status in present})
+
+
 def _open_files(
     path: Path, names: list[str], notices: list[str], salvaging: bool
 ) -> list[StorageFile]:
     files: list[StorageFile] = []
     errors: list[RecordingError] = []
+    missing = [name for name in names if not (path / name).is_file()]
+    notices += [f'{path / name}: is missing' for name in missing[:_NAMED_FILES]]
+    if len(missing) > _NAMED_FILES:
+        notices.append(f'{path}: {len(missing) - _NAMED_FILES} more of its files are missing')
+    known: dict[tuple[int, int], str] = {}
+    absent = frozenset(missing)
     for name in names:
-        if not (path / name).is_file():
-            notices.append(f'{path / name}: is missing')
+        if name in absent:
+            continue
+        status = (path / name).stat()
+        other = known.setdefault((status.st_dev, status.st_ino), name)
+        if other != name:
+            notices.append(f'{path / name}: is {other} under another name; it is read once')
             continue
         try:
             files.append(_open_file(path / name, salvaging))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from mcap.opcode import Opcode
 
-from nanorocks_ros.limits import CHUNK_BYTES, CHUNK_MESSAGES
+from nanorocks_ros.limits import CHUNK_BYTES, CHUNK_MESSAGES, RECORD_RATIO
 from nanorocks_ros.recordings.mcap.mcap_catalogue import Catalogue
 from nanorocks_ros.recordings.mcap.mcap_chunks import (
     FRAME_STARTS,
@@ -23,6 +23,7 @@ from nanorocks_ros.recordings.mcap.mcap_chunks import (
     ChecksumError,
     DamagedError,
     TooLargeError,
+    Unpacked,
     stored_chunk,
     unpacked,
     unpacked_prefix,
@@ -40,6 +41,8 @@ _INDEX_ENTRY_BYTES = 16
 # Channels and schemas are at the front of a chunk.
 _CATALOGUE_BYTES = 1 << 21
 _IN_CHUNKS = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
+# So many records may be packed into any number of bytes.
+_FEW_RECORDS = 1000
 
 
 class StoredMessage(NamedTuple):
@@ -126,16 +129,28 @@ def _message(content: memoryview) -> StoredMessage:
     return StoredMessage(channel, log_time_ns, content[MESSAGE_HEAD.size :])
 
 
+def _bounded_records(
+    data: memoryview, packed: int, *, cut: bool
+) -> Iterator[tuple[int, memoryview]]:
+    """As `iterate_records`, while there are no more than a chunk of so many bytes may hold."""
+    most, ratio = CHUNK_MESSAGES.value, max(_FEW_RECORDS, packed * RECORD_RATIO.value)
+    for number, record in enumerate(iterate_records(data, cut=cut)):
+        if number >= ratio:
+            raise TooLargeError(RECORD_RATIO)
+        if number >= most:
+            raise TooLargeError(CHUNK_MESSAGES)
+        yield record
+
+
 def _collect(
-    data: memoryview, catalogue: Catalogue, messages: list[StoredMessage], *, cut: bool
+    records: Iterator[tuple[int, memoryview]],
+    catalogue: Catalogue,
+    messages: list[StoredMessage],
 ) -> None:
-    """Append the messages in the data to a list, and add channels and schemas to a catalogue."""
-    most = CHUNK_MESSAGES.value
-    for opcode, content in iterate_records(data, cut=cut):
+    """Append the messages to a list, and add channels and schemas to a catalogue."""
+    for opcode, content in records:
         if opcode == Opcode.MESSAGE:
             messages.append(_message(content))
-            if len(messages) > most:
-                raise TooLargeError(CHUNK_MESSAGES)
         elif opcode in _IN_CHUNKS:
             catalogue.add(opcode, content)
         else:
@@ -143,17 +158,17 @@ def _collect(
 
 
 def _collect_readable(
-    data: memoryview, catalogue: Catalogue, messages: list[StoredMessage]
+    records: Iterator[tuple[int, memoryview]],
+    catalogue: Catalogue,
+    messages: list[StoredMessage],
 ) -> None:
     """As `_collect`, without records that cannot be read or are of another kind."""
-    for opcode, content in iterate_records(data, cut=True):
+    for opcode, content in records:
         with suppress(*UNREADABLE):
             if opcode == Opcode.MESSAGE:
                 messages.append(_message(content))
             else:
                 catalogue.add(opcode, content)
-        if len(messages) > CHUNK_MESSAGES.value:
-            raise TooLargeError(CHUNK_MESSAGES)
 
 
 def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMessage]:
@@ -175,6 +190,8 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     ------
     ChecksumError
         If only its checksum is wrong.
+    TooLargeError
+        If it is larger than a limit.
     DamagedError
         If any part of the block is damaged.
     """
@@ -186,13 +203,12 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     try:
         if block.chunk:
             data = memoryview(_records_of_chunk(raw, block))
-            if block.unverified:
-                _collect_readable(data, catalogue, messages)
-            else:
-                _collect(data, catalogue, messages, cut=block.cut)
+            records = _bounded_records(data, len(raw), cut=block.cut or block.unverified)
+            collect = _collect_readable if block.unverified else _collect
+            collect(records, catalogue, messages)
         else:
-            _collect(raw, catalogue, messages, cut=False)
-    except ChecksumError:
+            _collect(iterate_records(raw), catalogue, messages)
+    except (ChecksumError, TooLargeError):
         raise
     except UNREADABLE as error:
         _recover_catalogue(bytes(raw), catalogue)
@@ -202,7 +218,7 @@ def load(stream: BinaryIO, block: Block, catalogue: Catalogue) -> list[StoredMes
     return messages
 
 
-def _records_of_chunk(raw: memoryview, block: Block) -> bytes:
+def _records_of_chunk(raw: memoryview, block: Block) -> Unpacked:
     if block.indexed:
         opcode, length = RECORD.unpack_from(raw)
         if opcode != Opcode.CHUNK or RECORD.size + length != block.length:
@@ -242,7 +258,8 @@ def _recover_catalogue(raw: bytes, catalogue: Catalogue) -> None:
         offset = raw.find(magic)
         if offset < 0:
             continue
-        data = unpacked_prefix(raw[offset : offset + _CATALOGUE_BYTES], compression)
+        packed = raw[offset : offset + _CATALOGUE_BYTES]
+        data = unpacked_prefix(packed, compression, _CATALOGUE_BYTES)
         try:
             for opcode, content in iterate_records(memoryview(data), cut=True):
                 catalogue.add(opcode, content)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 import zlib
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import lz4.frame
 import zstandard
@@ -26,8 +26,9 @@ CHUNK_HEAD = struct.Struct('<QQQII')
 """Times, size, checksum, and length of the name of the compression."""
 
 _LENGTH = struct.Struct('<Q')
-# Damaged data is decompressed in pieces; the checksum at the end is a piece of its own.
-_SMALL_PIECE, _CHECKSUM_BYTES = 1 << 12, 4
+# Data is decompressed in pieces, of which none becomes large: zstd packs 128 KiB into 4 bytes.
+# The checksum at the end is a piece of its own.
+_SMALL_PIECE, _CHECKSUM_BYTES = 1 << 9, 4
 # The longest head of zstd data, which states the unpacked size.
 _ZSTD_HEAD_BYTES = 32
 # The ratio is limited for large chunks only: zeros of a dark image are packed well.
@@ -46,6 +47,9 @@ UNREADABLE = (
 """Exceptions of the `mcap` library and the decompressors for damaged data."""
 
 
+Unpacked: TypeAlias = 'bytes | bytearray'
+
+
 class DamagedError(ValueError):
     """A part of a file cannot be read."""
 
@@ -55,11 +59,11 @@ class ChecksumError(DamagedError):
 
     Parameters
     ----------
-    data : bytes
+    data : bytes or bytearray
         What it holds; single bits may be wrong.
     """
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: Unpacked) -> None:
         super().__init__('checksum of a chunk is wrong')
         self.data = data
 
@@ -112,7 +116,7 @@ def stored_chunk(content: memoryview) -> StoredChunk:
         raise DamagedError('head of a chunk is damaged') from error
 
 
-def unpacked(chunk: StoredChunk) -> bytes:
+def unpacked(chunk: StoredChunk) -> Unpacked:
     """The records of a chunk.
 
     Raises
@@ -132,7 +136,7 @@ def unpacked(chunk: StoredChunk) -> bytes:
     return data
 
 
-def _unpacked(chunk: StoredChunk) -> bytes:
+def _unpacked(chunk: StoredChunk) -> Unpacked:
     if not chunk.compression:
         return bytes(chunk.packed)
     if chunk.compression not in FRAME_STARTS:
@@ -150,18 +154,18 @@ def _decompressor(compression: str) -> Any:
     )
 
 
-def _in_pieces(packed: memoryview, compression: str) -> bytes:
+def _in_pieces(packed: memoryview, compression: str) -> bytearray:
     """Unpack piece by piece, so that a bomb is noticed before it fills the memory."""
     decompressor, content = _decompressor(compression), bytearray()
     for start in range(0, len(packed), _SMALL_PIECE):
         content += decompressor.decompress(bytes(packed[start : start + _SMALL_PIECE]))
         _check_size(len(content), len(packed))
         if decompressor.eof:
-            return bytes(content)
+            return content
     raise DamagedError('compressed data of a chunk ends early')
 
 
-def _zstd(packed: memoryview) -> bytes:
+def _zstd(packed: memoryview) -> Unpacked:
     stated = zstandard.get_frame_parameters(bytes(packed[:_ZSTD_HEAD_BYTES])).content_size
     if stated == zstandard.CONTENTSIZE_UNKNOWN:
         return _in_pieces(packed, 'zstd')
@@ -176,8 +180,17 @@ def _check_size(size: int, packed: int) -> None:
         raise TooLargeError(CHUNK_RATIO)
 
 
-def unpacked_prefix(data: bytes, compression: str) -> bytes:
-    """Unpack truncated or damaged data as far as possible, within the limit of a chunk."""
+def unpacked_prefix(data: bytes, compression: str, most: int | None = None) -> Unpacked:
+    """Unpack truncated or damaged data as far as possible.
+
+    Parameters
+    ----------
+    data : bytes
+    compression : str
+    most : int, optional, [bytes]
+        No more than somewhat above this; by default the limit of a chunk.
+    """
+    most = CHUNK_BYTES.value if most is None else most
     if not compression:
         return data
     decompressor = _decompressor(compression)
@@ -188,8 +201,8 @@ def unpacked_prefix(data: bytes, compression: str) -> bytes:
     try:
         for start, end in pairwise([*starts, len(data)]):
             content += decompressor.decompress(data[max(0, start) : end])
-            if len(content) > CHUNK_BYTES.value:
+            if len(content) > most:
                 break
     except UNREADABLE:
         pass
-    return bytes(content)
+    return content

@@ -19,6 +19,7 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import (
 from nanorocks_ros.recordings.mcap.mcap_chunks import DamagedError, TooLargeError
 from nanorocks_ros.recordings.mcap.mcap_index import McapIndex, read_index, recorder_notes
 from nanorocks_ros.recordings.mcap.mcap_notices import damage_notices
+from nanorocks_ros.recordings.mcap.mcap_overlap import WaitingBlocks
 from nanorocks_ros.recordings.mcap.mcap_scan import scan
 from nanorocks_ros.recordings.offered_qos import recorded_qos
 from nanorocks_ros.recordings.storage import BagMessage, TopicInfo
@@ -147,17 +148,27 @@ class McapFile:
             and self._may_contain(block, wanted)
         ]
         heapq.heapify(queue)
+        waiting = WaitingBlocks()
         with self.path.open('rb') as stream:
             while queue:
                 _, offset, _, item = heapq.heappop(queue)
                 if isinstance(item, StoredMessage):
+                    waiting.take(offset)
                     yield self._message(item)
                     continue
-                for number, message in enumerate(self._load(stream, item)):
-                    in_range = first <= message.log_time_ns <= last
-                    if in_range and self._is_wanted(message.channel, wanted):
-                        entry = (message.log_time_ns, offset, number, message)
-                        heapq.heappush(queue, entry)
+                messages = [
+                    message
+                    for message in self._load(stream, item)
+                    if first <= message.log_time_ns <= last
+                    and self._is_wanted(message.channel, wanted)
+                ]
+                try:
+                    waiting.add(offset, messages)
+                except TooLargeError as error:
+                    self._leave_out(stream, item, error)
+                    continue
+                for number, message in enumerate(messages):
+                    heapq.heappush(queue, (message.log_time_ns, offset, number, message))
 
     def _may_contain(self, block: Block, wanted: frozenset[str] | None) -> bool:
         if wanted is None or block.channels is None:
@@ -173,10 +184,7 @@ class McapFile:
         try:
             messages = load(stream, block, index.catalogue)
         except DamagedError as error:
-            if isinstance(error, TooLargeError):
-                index.refusals.add(str(error))
-            index.lost[block.offset] = indexed_count_after(stream, block) or 0
-            index.read[block.offset] = 0
+            self._leave_out(stream, block, error)
             return []
         if block.indexed_bytes:
             self._compare_with_index(stream, block, len(messages))
@@ -186,6 +194,13 @@ class McapFile:
             index.lost[block.offset] = orphans
         index.read[block.offset] = len(messages) - orphans
         return messages
+
+    def _leave_out(self, stream: BinaryIO, block: Block, error: DamagedError) -> None:
+        index = self._index
+        if isinstance(error, TooLargeError):
+            index.refusals.add(str(error))
+        index.lost[block.offset] = indexed_count_after(stream, block) or 0
+        index.read[block.offset] = 0
 
     def _compare_with_index(self, stream: BinaryIO, block: Block, count: int) -> None:
         """Count messages that the message indexes list and that a readable chunk lacks."""

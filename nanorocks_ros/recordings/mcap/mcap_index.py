@@ -23,6 +23,7 @@ from nanorocks_ros.recordings.mcap.mcap_blocks import (
 )
 from nanorocks_ros.recordings.mcap.mcap_catalogue import Catalogue, data_stream
 from nanorocks_ros.recordings.mcap.mcap_chunks import UNREADABLE
+from nanorocks_ros.recordings.mcap.mcap_index_check import is_consistent
 from nanorocks_ros.recordings.storage import LAST_NS
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ class McapIndex:
         Whether the file has its footer.
     bytes_unread : int
         Number of bytes at the end of a truncated file that contain no complete record.
+    bytes_behind : int
+        Number of bytes behind the footer of a scanned file, which are not read.
     metadata_at : list of (int, int)
         Offset and length of the metadata records of rosbag2, [bytes].
     stated : int or None
@@ -83,6 +86,7 @@ class McapIndex:
     invalid_times: dict[int, int] = field(default_factory=dict)
     ended: bool = False
     bytes_unread: int = 0
+    bytes_behind: int = 0
     metadata_at: list[tuple[int, int]] = field(default_factory=list)
     stated: int | None = None
     repaired: set[int] = field(default_factory=set)
@@ -130,6 +134,7 @@ class McapIndex:
             or self.catalogue.contradictions
             or self.refusals
             or self.wrong_checksum
+            or self.bytes_behind
             or self.miscount
             or (self.unknown_records and self.stated is None)
         )
@@ -210,8 +215,10 @@ def add_summary(index: McapIndex, stream: BinaryIO, position: int) -> None:
     position : int, [bytes]
         Where the summary section begins.
     """
+    # A buffer of the size that is asked for is made before anything is read.
+    most = min(SUMMARY_BYTES.value, stream.seek(0, 2) - position)
     stream.seek(position)
-    summary = memoryview(stream.read(SUMMARY_BYTES.value))
+    summary = memoryview(stream.read(max(0, most)))
     try:
         for opcode, content in iterate_records(summary, cut=True):
             if opcode == Opcode.STATISTICS:
@@ -248,14 +255,7 @@ def _from_summary(summary: memoryview, size: int) -> McapIndex | None:
         return None
     index.counts = Counter(statistics.channel_message_counts)
     index.stated = statistics.message_count
-    consistent = (
-        index.counts.total() == statistics.message_count
-        and set(index.counts) <= set(index.catalogue.channels)
-        and all(b.offset >= len(MAGIC) and b.offset + b.length <= size for b in index.blocks)
-        and (index.blocks or not statistics.message_count)
-        and statistics.message_end_time <= LAST_NS
-    )
-    if not consistent:
+    if not is_consistent(index.blocks, index.catalogue, statistics, size):
         return None
     if statistics.message_count:
         index.start_ns = statistics.message_start_time

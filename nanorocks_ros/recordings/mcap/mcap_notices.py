@@ -37,6 +37,11 @@ def damage_notices(index: McapIndex) -> list[str]:
         )
     if index.wrong_checksum:
         notices.append('its data differ from their checksum; single messages may be wrong')
+    if index.bytes_behind:
+        notices.append(
+            f'the last {index.bytes_behind} bytes stand behind its end and were not read; if they '
+            f'are another recording, `tail -c {index.bytes_behind}` of the file copies it'
+        )
     return [*notices, *_miscount(index)]
 
 

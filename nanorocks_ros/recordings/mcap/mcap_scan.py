@@ -74,7 +74,7 @@ class _Scanner:
             if self._at_end_of_data:
                 self._end_run()
                 self._settle_damage()
-                self.index.ended = self._has_footer()
+                self.index.ended, self.index.bytes_behind = self._end_of_file(head)
                 add_summary(self.index, self._stream, head.end)
                 return
         self._end_run()
@@ -273,9 +273,15 @@ class _Scanner:
         self.index.add_block(unread, messages)
         return max(count, int(chunk and not unverified))
 
-    def _has_footer(self) -> bool:
+    def _end_of_file(self, head: Head) -> tuple[bool, int]:
+        """Whether the file ends as it should, and how many bytes stand behind its footer."""
         self._stream.seek(self._size - len(MAGIC))
-        return self._stream.read() == MAGIC
+        has_magic = self._stream.read() == MAGIC
+        last: Head | None = head
+        while last is not None and last.opcode != Opcode.FOOTER:
+            last = read_head(self._stream, last.end, self._size)
+        behind = 0 if last is None else self._size - last.end - len(MAGIC)
+        return has_magic, max(0, behind)
 
     def _note_truncation(self, position: int) -> None:
         self.index.bytes_unread = self._size - position

@@ -188,7 +188,7 @@ def frame_from_compressed(message: Any, where: str) -> Frame:
     stamp_ns = valid_stamp_ns(message, where)
     # OpenCV decodes a truncated JPEG without an error and fills the missing part with gray.
     complete = data[:2].tobytes() != JPEG_START or is_whole_jpeg(data.data)
-    image = decoded_image(data) if complete else None
+    image = decoded_image(data, where) if complete else None
     if image is None:
         kind = image_kind(message)
         if kind in _VIDEO_CODECS:

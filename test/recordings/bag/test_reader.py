@@ -612,6 +612,31 @@ def test_a_file_that_is_listed_three_times_is_read_once(tmp_path, record):
     assert len(list(bag.messages())) == 81
 
 
+@pytest.mark.parametrize('make', [os.symlink, os.link])
+def test_a_file_with_a_second_name_is_read_once_and_told(tmp_path, record, make):
+    path = record(tmp_path / 'run')
+    make(path / 'run.mcap', path / 'run_1.mcap')
+    file = path / 'metadata.yaml'
+    file.write_text(file.read_text().replace('  - run.mcap\n', '  - run.mcap\n  - run_1.mcap\n'))
+    bag = open_bag(path)
+    assert len(list(bag.messages())) == 81
+    assert bag.notices == (
+        f'{path / "run_1.mcap"}: is run.mcap under another name; it is read once',
+    )
+    assert bag.complete
+
+
+def test_of_many_missing_files_a_few_are_named(tmp_path, record):
+    path = record(tmp_path / 'run')
+    file = path / 'metadata.yaml'
+    listed = ''.join(f'  - f{number}.mcap\n' for number in range(1000))
+    file.write_text(file.read_text().replace('  - run.mcap\n', f'{listed}  - run.mcap\n'))
+    bag = open_bag(path)
+    assert not bag.complete
+    assert len(bag.notices) == 6
+    assert bag.notices[-1] == f'{path}: 995 more of its files are missing'
+
+
 def test_provenance_that_differs_from_its_copy_is_told(tmp_path, record):
     path = record(tmp_path / 'run')
     file = path / 'metadata.yaml'
