@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from benchmarks.drawn_scenes import SCENES, draw
+from nanorocks_ros.outputs.photographs import write_words
 from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_model import scene_model
 
@@ -28,7 +29,7 @@ _RIGHT = 0.3
 _SEEDS = (1, 2, 3)
 _LEARNING_FRAMES = 25
 _EVERY = 6
-_RING, _INK = (0, 255, 255), (0, 0, 0)
+_RING = 0, 255, 255
 _UNKNOWN = math.nan, math.nan
 
 
@@ -145,9 +146,7 @@ def picture(path):
         frames, _ = draw(scene)
         discs, _, _ = discs_in(frames, _UNKNOWN)
         tile = with_discs(frames[0], discs[0])
-        for colour, thickness in ((_INK, 4), (_RING, 1)):
-            cv2.putText(tile, name, (8, 292), cv2.FONT_HERSHEY_SIMPLEX, 0.55, colour, thickness,
-                        cv2.LINE_AA)  # fmt: skip
+        write_words(tile, name, (8, 290), 0.55, _RING)
         tiles.append(tile)
     rows = [np.hstack(tiles[k : k + 3]) for k in range(0, len(tiles), 3)]
     cv2.imwrite(path, np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 75])

@@ -107,7 +107,7 @@ class TrayBoard:
             self._finish(record)
         self.heard_s = now_s
         if record.cycle > self.cycle:
-            self._keep_cycle()
+            self._keep_cycle(record)
             self._begin(record)
         if record.cycle < self.cycle:
             # Late, of an earlier cycle.
@@ -131,11 +131,16 @@ class TrayBoard:
         self.latest[name] = as_fields(record)
         self.series[name].append(_row(record))
 
-    def _keep_cycle(self) -> None:
-        """Keep the cycle that is over, unless it is the time before the first shaking event."""
+    def _keep_cycle(self, following: ArrayRecord) -> None:
+        """Keep the cycle that is over, unless it is the time before the first shaking event.
+
+        The truth is not delayed by measuring: what is of the following cycle is left out.
+        """
         if self.cycle < 1:
             return
         rows = {name: series.rows for name, series in self.series.items()}
+        end_ns = getattr(following, 'cycle_start_ns', None) or following.stamp_ns
+        rows['truth'] = [row for row in rows['truth'] if (row[0] or 0.0) < end_ns / NS]
         start = None if self.start_ns is None else _number(self.start_ns / NS)
         self.past.keep(self.cycle, start, self.latest, rows)
         self._finals_version += 1

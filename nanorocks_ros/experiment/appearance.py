@@ -35,6 +35,8 @@ COLOURS = {
 }
 """Colours by name, as blue, green and red in even light, [gray levels]."""
 _HEX = re.compile(r'#?([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})')
+COLOUR_FORMS = f'{", ".join((AUTO, *COLOURS))}, or red, green, blue as "#c03020"'
+"""How a colour may be told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +74,11 @@ def read_appearance(
     return Appearance(sign=LOOKS[word], colour=_colour(lines, colour, name))
 
 
+def is_colour(name: str) -> bool:
+    """Whether a colour can be told by this name."""
+    return name == AUTO or name in COLOURS or _HEX.fullmatch(name) is not None
+
+
 def _colour(
     lines: YamlLines, node: yaml.Node | None, name: str
 ) -> tuple[float, float, float] | None:
@@ -81,9 +88,6 @@ def _colour(
         return COLOURS[name]
     levels = _HEX.fullmatch(name)
     if levels is None:
-        known = ', '.join((AUTO, *COLOURS))
-        raise lines.error(
-            node, f'unknown colour {name!r}', f'use {known}, or red, green, blue as "#c03020"'
-        )
+        raise lines.error(node, f'unknown colour {name!r}', f'use {COLOUR_FORMS}')
     red, green, blue = (float(int(level, 16)) for level in levels.groups())
     return blue, green, red

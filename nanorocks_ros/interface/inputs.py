@@ -91,14 +91,19 @@ class Recording(NamedTuple):
         What the user named, without its folder.
     notices : tuple of str
         Of the import.
+    imported : bool
+        Whether the bag was made of a film.
     """
 
     bag: Path
     name: str
     notices: tuple[str, ...] = ()
+    imported: bool = False
 
     def named(self, notices: Iterable[str]) -> tuple[str, ...]:
         """Notices that name a film where they name its import."""
+        if not self.imported:
+            return tuple(notices)
         return tuple(with_film(notice, self.bag, self.name) for notice in notices)
 
 
@@ -117,7 +122,7 @@ def recording(path: PathLike, *, progress: bool) -> Recording:
         return Recording(own, name)
     with part_bar(f'importing {name}', shown=progress) as show:
         film = cached_import(own, show)
-    return Recording(film.bag, name, film.notices)
+    return Recording(film.bag, name, film.notices, imported=True)
 
 
 def named_paths(recordings: PathLike | Iterable[PathLike]) -> list[Path]:

@@ -7,7 +7,7 @@ import html
 import math
 import re
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
@@ -24,6 +24,7 @@ _TYPES = {'.png': 'image/png', '.jpg': 'image/jpeg'}
 # A cell that begins so holds numbers, which stay in one line up to this length.
 _NUMBER = re.compile(r'[-+−–]?(\d|–$)')
 _LONGEST_NUMBER = 40
+_CODE = re.compile(r'`([^`]+)`')
 _LETTERS = {' +- ': ' ± ', '/s^2': '/s²', ' um/': ' µm/'}
 
 
@@ -123,7 +124,7 @@ def write_report(
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>\n'
         f'<h1>{html.escape(title)}</h1><p class="conclusion">{html.escape(conclusion)}</p>'
-        f'<p class="made">{html.escape(made or made_line())}</p>'
+        f'<p class="made">{_with_code(made or made_line())}</p>'
         f'<nav><ol>{contents}</ol></nav>\n{body}</body></html>\n'
     )
     with atomic_file(path) as part:
@@ -137,7 +138,20 @@ def _part(part: str | Table | Picture | Erratum) -> str:
         return _picture(part)
     if isinstance(part, Erratum):
         return f'<p class="errs"><b>Where the paper errs.</b> {html.escape(part.text)}</p>\n'
-    return f'<p>{html.escape(_typeset(part))}</p>\n'
+    return f'<p>{_with_code(_typeset(part))}</p>\n'
+
+
+def _with_code(text: str) -> str:
+    """A text as HTML, with what stands between backticks as code."""
+    return _CODE.sub(lambda match: _code(match[1]), html.escape(text))
+
+
+def _code(command: str) -> str:
+    """A command that is broken between its words; a browser breaks options after a hyphen."""
+    words = (
+        f'<span>{word}</span>' if word.startswith('-') else word for word in command.split(' ')
+    )
+    return f'<code>{" ".join(words)}</code>'
 
 
 def _typeset(text: str) -> str:
@@ -156,7 +170,7 @@ def made_line(command: str = '') -> str:
         That of this process if not given.
     """
     told = command or command_line() or program_name()
-    date = datetime.now(UTC).strftime('%Y-%m-%d %H:%M UTC')
+    date = datetime.now(timezone.utc).strftime('%Y-%m-%d %H:%M UTC')
     return f'Made on {date} with nanorocks_ros {__version__} by `{told}`.'
 
 

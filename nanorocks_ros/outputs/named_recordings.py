@@ -38,6 +38,8 @@ def with_film(text: str, bag: str | Path, film: str | Path) -> str:
     film : str or Path
         As the user named it.
     """
+    if str(bag) == str(film):
+        return text
     # The one topic of such a bag is of no interest to whoever has a film.
     own = rf'{re.escape(str(bag))}(?![\w/.-])(: /[\w/]+(?=: ))?'
     return re.sub(own, lambda _: str(film), text)

@@ -20,7 +20,7 @@ nav ol { columns: 2 18rem; } a { color: var(--link); }
 .made, figcaption { color: var(--muted); font-size: .92rem; }
 figure { margin: 1rem 0; } figcaption { padding: .3rem 0; }
 figure img { max-width: 100%; height: auto; background: #fff; padding: 4px; border-radius: 4px; }
-.scroll { overflow-x: auto; }
+.scroll { overflow-x: auto; } code { font-size: .92em; } code span { white-space: nowrap; }
 @media (max-width: 600px) {
   figure.text { overflow-x: auto; } figure.text img { width: 640px; max-width: none; } }
 table { border-collapse: collapse; font-size: .92rem; overflow-wrap: normal; }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from nanorocks_ros.cli.main import build_parser
-from nanorocks_ros.outputs.named_recordings import with_recording
+from nanorocks_ros.outputs.named_recordings import with_film, with_recording
 from nanorocks_ros.records import Quality
 from nanorocks_ros.records.result_words import flags_in_words
 
@@ -43,3 +43,11 @@ def test_no_remedy_of_a_flag_keeps_a_placeholder():
                 assert build_parser().parse_args(words[1:]).bag == 'a b'
                 parsed += 1
     assert parsed
+
+
+def test_a_film_is_named_in_place_of_its_import_and_a_bag_stays():
+    notice = 'a/.nanorocks/f.avi: /nanorocks/camera/image_raw: 3 frames are damaged'
+    assert with_film(notice, 'a/.nanorocks/f.avi', 'a/f.avi') == 'a/f.avi: 3 frames are damaged'
+    other = 'a/.nanorocks/f.avi_measured: kept'
+    assert with_film(other, 'a/.nanorocks/f.avi', 'a/f.avi') == other
+    assert with_film(notice, 'a/.nanorocks/f.avi', 'a/.nanorocks/f.avi') == notice

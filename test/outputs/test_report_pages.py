@@ -44,9 +44,18 @@ def report(tmp_path_factory):
 def test_the_conclusion_stands_first_then_date_version_and_command(report):
     page = report.read_text('utf-8')
     made = re.search(
-        rf'Made on \d{{4}}-\d\d-\d\d \d\d:\d\d UTC with nanorocks_ros {__version__} by `', page
+        rf'Made on \d{{4}}-\d\d-\d\d \d\d:\d\d UTC with nanorocks_ros {__version__} by <code>',
+        page,
     )
     assert page.index('<h1>') < page.index(CONCLUSION) < made.start() < page.index('<nav>')
+
+
+def test_a_command_in_backticks_is_code_whose_options_are_not_broken(tmp_path):
+    parts = ['run `nanorocks look my_film --at 2` <again>']
+    write_report(tmp_path / 'r.html', 'T', 'C', [Section(title='one', parts=parts)])
+    page = (tmp_path / 'r.html').read_text('utf-8')
+    code = '<code>nanorocks look my_film <span>--at</span> 2</code>'
+    assert f'<p>run {code} &lt;again&gt;</p>' in page
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])

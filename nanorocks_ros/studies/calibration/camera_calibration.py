@@ -10,6 +10,7 @@ import numpy as np
 from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.view import IdentityLens, View
+from nanorocks_ros.outputs.photographs import write_words
 from nanorocks_ros.stages.preprocess.plate_search import guess_plate
 from nanorocks_ros.stages.preprocess.rectify import nodes_of, resample_color
 from nanorocks_ros.studies.calibration.plate_fit import PlateFit, fit_plate
@@ -30,7 +31,7 @@ _MAX_IMAGES = 31
 _MIN_CONTRAST = 2.5
 _MIN_VISIBLE_SHARE = 0.6
 MAX_RESIDUAL_PX = 0.5
-_GREEN, _RED, _WHITE, _BLACK = (60, 220, 60), (60, 60, 240), (255, 255, 255), (0, 0, 0)
+_GREEN, _RED, _WHITE = (60, 220, 60), (60, 60, 240), (255, 255, 255)
 
 
 def calibrate(
@@ -153,8 +154,7 @@ def draw_calibration(picture: NDArray[np.uint8], calibration: Calibration) -> ND
         # Lines are drawn on pixels; a region ends between two pixels.
         cv2.rectangle(canvas, corners[0], (corners[1][0] - 1, corners[1][1] - 1), _GREEN, 1)
         at = (region.x + 4, region.y - 8)
-        for colour, thickness in ((_BLACK, 3), (_GREEN, 1)):
-            cv2.putText(canvas, f'tray {number}', at, 0, 0.6, colour, thickness, cv2.LINE_AA)
+        write_words(canvas, f'tray {number}', at, 0.6, _GREEN)
     _draw_scale(canvas, calibration.pixels_per_metre)
     return canvas
 

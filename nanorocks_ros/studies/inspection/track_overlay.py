@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from nanorocks_ros.outputs.photographs import write_photograph
+from nanorocks_ros.outputs.photographs import write_photograph, write_words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,11 +96,10 @@ def with_scale_bar(picture: NDArray[np.uint8], pixels_per_metre: float) -> NDArr
     length = bar_length(1e3 * columns / pixels_per_metre)
     canvas: Any = picture.copy()
     left, bottom = columns // 25, rows - rows // 25
-    right, size = left + round(1e-3 * length * pixels_per_metre), max(columns / 1000.0, 0.45)
-    for colour, more in ((_BLACK, 2), (_WHITE, 0)):
-        cv2.line(canvas, (left, bottom), (right, bottom), colour, 3 + 2 * more)
-        cv2.putText(canvas, f'{length:g} mm', (left, bottom - 8), cv2.FONT_HERSHEY_SIMPLEX, size,
-                    colour, 1 + more, cv2.LINE_AA)  # fmt: skip
+    right, size = left + round(1e-3 * length * pixels_per_metre), max(columns / 1000.0, 0.7)
+    for colour, thickness in ((_BLACK, 7), (_WHITE, 3)):
+        cv2.line(canvas, (left, bottom), (right, bottom), colour, thickness)
+    write_words(canvas, f'{length:g} mm', (left, bottom - 10), size, _WHITE)
     return np.asarray(canvas, dtype=np.uint8)
 
 

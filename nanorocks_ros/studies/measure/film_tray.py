@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.appearance import AUTO
+from nanorocks_ros.experiment.appearance import AUTO, COLOUR_FORMS, LOOKS, is_colour
 from nanorocks_ros.experiment.film_section import FilmSection
 
 if TYPE_CHECKING:
@@ -108,6 +108,7 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
     if not filmed.beads:
         raise ConfigurationError('--diameter-px', 'is needed', 'measure a bead in the picture')
     region = _region(filmed.corners_px, size)
+    _check_beads(filmed.beads, region)
     scale, scale_notice = _scale(filmed, region)
     largest = max(beads.diameter or beads.diameter_px / scale for beads in filmed.beads)
     known = filmed.sides is not None and filmed.height is not None
@@ -126,6 +127,24 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
         text=_text(filmed, section, sides),
         notices=tuple(notice for notice in notices if notice),
     )
+
+
+def _check_beads(species: Sequence[FilmedBeads], region: tuple[int, int, int, int]) -> None:
+    """Refuse beads that the trays file could not describe, by the names of their options."""
+    width, height = region[2:]
+    for beads in species:
+        if beads.look not in LOOKS:
+            problem = f'unknown look {beads.look!r}'
+            raise ConfigurationError('--look', problem, f'use {", ".join(LOOKS)}')
+        if not is_colour(beads.colour):
+            problem = f'unknown colour {beads.colour!r}'
+            raise ConfigurationError('--colour', problem, f'use {COLOUR_FORMS}')
+        if beads.diameter_px > min(width, height):
+            raise ConfigurationError(
+                '--diameter-px',
+                f'{beads.diameter_px:g} px do not fit into the container of {width}x{height} px',
+                'give the diameter of one bead in px of the film',
+            )
 
 
 def _guesses(filmed: FilmedTray, largest: float) -> list[str]:

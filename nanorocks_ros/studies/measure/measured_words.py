@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
 
 _STANDARD_GRAVITY = 9.80665
+# Ratio to the speeds at the ends of the film above which the highest is told.
+_MUCH_HIGHER = 1.5
 
 
 class LengthUnit(NamedTuple):
@@ -37,6 +39,9 @@ def motion_line(speeds: TrackSpeeds, contacts: TrackContacts, unit: LengthUnit) 
     """How the beads move: speeds, and the acceleration that they share."""
     first, last = (number(speed, 3, unit.per_metre) for speed in speeds.ends)
     text = f'mean speed {first} {unit.name}/s at first, {last} {unit.name}/s at last'
+    # As of a tray that is shaken some time after the film begins.
+    if speeds.highest > _MUCH_HIGHER * max(speeds.ends):
+        text += f', at most {number(speeds.highest, 3, unit.per_metre)} {unit.name}/s'
     acceleration = contacts.acceleration
     if not acceleration.pieces:
         return f'{text}; flights are too short to show an acceleration'

@@ -61,6 +61,12 @@ class TrackSpeeds(NamedTuple):
         part = max(1, round(_END * known.size))
         return float(known[:part].mean()), float(known[-part:].mean())
 
+    @property
+    def highest(self) -> float:
+        """The highest mean speed of a bin, [m/s]."""
+        known = self.mean[np.isfinite(self.mean)]
+        return float(known.max()) if known.size else math.nan
+
 
 def track_speeds(tracks: Sequence[Tracks]) -> TrackSpeeds:
     """Mean and rms speed of all beads that are seen, with a bin for some frames each."""

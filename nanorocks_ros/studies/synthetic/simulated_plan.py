@@ -153,7 +153,9 @@ def check_duration(duration: float) -> None:
         Unless it is above 0 and at most a day.
     """
     if not (math.isfinite(duration) and 0.0 < duration <= MAX_DURATION):
-        raise ConfigurationError('--duration', f'{duration}', f'give up to {MAX_DURATION:g} s')
+        raise ConfigurationError(
+            '--duration', f'{duration:g}', f'give seconds above 0, up to {MAX_DURATION:g}'
+        )
 
 
 def default_samples(settings: SimulationSettings, duration: float, limit: int = 301) -> int:

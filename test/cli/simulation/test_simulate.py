@@ -152,7 +152,7 @@ def test_effects_can_be_switched_off(capsys, tmp_path):
     [
         (['--runs', '0'], 2, '--runs: 0; give 1 or more'),
         (['--times', '1'], 2, '--times: 1; give 2 or more'),
-        (['--duration', 'nan'], 2, '--duration: nan; give up to 86400 s'),
+        (['--duration', 'nan'], 2, '--duration: nan; give seconds above 0, up to 86400'),
         (['--workers', '0'], 2, '--workers: 0; give 1 or more'),
         (['--tray', '9'], 2, 'tray: 9 is outside [1, 8]'),
         (['--restitution', 'much'], 2, '--restitution: '),

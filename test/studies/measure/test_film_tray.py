@@ -93,3 +93,19 @@ def test_corners_that_are_clicked_a_little_off_are_taken():
     corners = ((31.0, 19.0), (330.0, 21.0), (329.0, 222.0), (30.0, 220.0))
     tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0),), corners_px=corners))
     assert film_section(tray.text).region_px == (30, 19, 300, 203)
+
+
+@pytest.mark.parametrize(
+    ('beads', 'told'),
+    [
+        (FilmedBeads(diameter_px=20.0, look='shiny'), "--look: unknown look 'shiny'; use auto"),
+        (FilmedBeads(diameter_px=20.0, colour='reddish'), "--colour: unknown colour 'reddish'"),
+        (
+            FilmedBeads(diameter_px=250.0),
+            '--diameter-px: 250 px do not fit into the container of 360x240',
+        ),
+    ],
+)
+def test_what_cannot_be_is_told_by_the_name_of_its_option(beads, told):
+    with pytest.raises(ConfigurationError, match=told):
+        described(FilmedTray(beads=(beads,)))
