@@ -48,6 +48,8 @@ class _Interrupts:
     ----------
     requested : bool
         Whether the process was asked to end.
+    first : str
+        Name of the first signal; empty before.
     exit_immediately : bool
         Whether to exit on the first signal: while a node is built, kernels compile for seconds,
         and there is nothing to clean up.
@@ -55,6 +57,7 @@ class _Interrupts:
 
     def __init__(self) -> None:
         self.requested = False
+        self.first = ''
         self.exit_immediately = False
         self._first_at = 0.0
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -66,6 +69,7 @@ class _Interrupts:
         now = time.monotonic()
         if not self.requested:
             self.requested, self._first_at = True, now
+            self.first = signal.Signals(number).name
         elif now - self._first_at > _PATIENCE_S:
             os._exit(128 + number)
 
@@ -169,6 +173,9 @@ def _spin(name: str, interrupts: _Interrupts) -> int:
         node.start_recording()
         while not node.done and not interrupts.requested:
             executor.spin_once(timeout_sec=_SPIN_S)
+        if interrupts.first:
+            # `python -m benchmarks signals` measures from here.
+            node.get_logger().info(f'interrupted by {interrupts.first}')
         return node.exit_code
     finally:
         try:
