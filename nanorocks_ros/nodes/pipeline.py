@@ -271,8 +271,7 @@ class PipelineNode(NanorocksNode):
             self._recorder.record_camera_info(camera_info)
 
     def end_recording(self) -> None:
-        """Write what waits, and the index; frames that wait for the trays are left out."""
-        self._background.discard_waiting()
+        """Write what waits, and the index."""
         if self._recorder is not None:
             self._recorder.close()
 
@@ -328,12 +327,18 @@ class PipelineNode(NanorocksNode):
         self.end_recording()
         self.finish()
 
+    def end_helpers(self) -> None:
+        """Leave out the frames that wait for the trays; processes end while the bag is written."""
+        self._background.close()
+        for worker in self._workers:
+            worker.kill()
+        if self._page is not None:
+            self._page.interrupt()
+
     def destroy_node(self) -> None:
-        """End processes and threads before the node that they work for."""
-        # The processes first: then the thread does not wait for what they are doing.
+        """Wait for the processes, before the node that they work for."""
         for worker in self._workers:
             worker.close()
-        self._background.close()
         if self._page is not None:
             self._page.close()
         super().destroy_node()

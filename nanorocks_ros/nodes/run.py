@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from importlib import import_module, resources
 from typing import TYPE_CHECKING, NoReturn
 
@@ -167,7 +167,12 @@ def _spin(name: str, interrupts: _Interrupts) -> int:
     node = make_node()
     executor = _executor_for(node)
     executor.add_node(node)
-    try:
+    with ExitStack() as ending:
+        # Each is called, whatever happens to the others; the last one here first.
+        ending.callback(node.destroy_node)
+        ending.callback(executor.shutdown)
+        ending.callback(node.end_recording)
+        ending.callback(node.end_helpers)
         node.check_parameters()
         interrupts.exit_immediately = False
         node.start_recording()
@@ -176,14 +181,7 @@ def _spin(name: str, interrupts: _Interrupts) -> int:
         if interrupts.first:
             # `python -m benchmarks signals` measures from here.
             node.get_logger().info(f'interrupted by {interrupts.first}')
-        return node.exit_code
-    finally:
-        try:
-            # First, whatever happens to the rest.
-            node.end_recording()
-        finally:
-            executor.shutdown()
-            node.destroy_node()
+    return node.exit_code
 
 
 def _executor_for(node: NanorocksNode) -> Executor:

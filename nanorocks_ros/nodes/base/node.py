@@ -125,6 +125,9 @@ class NanorocksNode(Node):
     def start_recording(self) -> None:
         """Open the recording of a node that makes one; from then on it has to be closed."""
 
+    def end_helpers(self) -> None:
+        """Ask threads and processes that work for the node to end, and do not wait for it."""
+
     def end_recording(self) -> None:
         """Close the recording of a node that makes one, also twice."""
 

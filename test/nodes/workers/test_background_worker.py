@@ -68,10 +68,14 @@ def test_closing_forgets_what_waits(spun):
         go_on.wait(20.0)
         done.append(number)
 
+    others = set(threading.enumerate())
     background = BackgroundWorker(node, work, lambda _: None)
+    (thread,) = set(threading.enumerate()) - others
     for number in range(5):
         background.put(number)
     assert begun.wait(20.0)
-    threading.Timer(0.2, go_on.set).start()
     background.close()
+    go_on.set()
+    thread.join(20.0)
+    assert not thread.is_alive()
     assert done == [0]
