@@ -8,6 +8,9 @@ from the first signal, and from the end of the loop, in which the node finishes 
 the end of the process. Beside it stands how many threads of the machine had or wanted a core when
 the signal was sent: its other work, too.
 
+The pipelines are forked from this process, which has loaded libraries and compiled functions: a
+start of its own would take most of the time, and has no part in the end.
+
 ``python -m benchmarks signals --count 200 --journal signals.jsonl`` makes the runs that the
 journal lacks and prints the table of all of them, so it may be interrupted and called again.
 """
@@ -25,6 +28,7 @@ import tempfile
 import time
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,10 +36,22 @@ import numpy as np
 
 from benchmarks import journal
 from benchmarks.fuzzing.mutations import generator_of
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.nodes.run import main as main_of_node
+from nanorocks_ros.nodes.run import node_class
+from nanorocks_ros.pipeline.warm_up import (
+    warm_up,
+    warm_up_clusters,
+    warm_up_cooling,
+    warm_up_speed,
+)
 from nanorocks_ros.recordings.bag.reader import open_bag
+from nanorocks_ros.settings import SimulationSettings
+from nanorocks_ros.simulation.tray_camera.tray_film import film
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from multiprocessing.context import ForkProcess
 
 _PATTERNS = (
     (signal.SIGINT,),
@@ -98,6 +114,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument('--journal', help='file of outcomes, to which this call adds')
     options = parser.parse_args(arguments)
     done = journal.read(options.journal)
+    _load_everything()
     try:
         for number in range(options.count):
             if number not in done:
@@ -108,6 +125,17 @@ def main(arguments: Sequence[str]) -> int:
     runs = [Ended(*outcome) for outcome in done.values()]
     print(table(runs))
     return int(not all(run.good for run in runs))
+
+
+def _load_everything() -> None:
+    """What a pipeline loads and compiles when it starts, but nothing of ROS that has threads."""
+    node_class('pipeline')
+    for _ in film(SimulationSettings(), load_trays()[1], frames=2):
+        pass
+    warm_up()
+    warm_up_speed()
+    warm_up_clusters()
+    warm_up_cooling()
 
 
 def _run(number: int) -> Ended:
@@ -176,25 +204,30 @@ def signalled(
                 start, end = _ended(process, pattern, gap)
         finally:
             process.kill()
-            process.wait()
+            process.join()
         complete = (bag / 'metadata.yaml').exists() and open_bag(bag).complete
         logged = _LOOP_ENDED.search(log.read_text('utf-8'))
         after_loop = end - float(logged[1]) if logged else math.nan
         names = ' '.join(each.name for each in pattern)
-        return Ended(names, busy, process.returncode, complete, end - start, after_loop, load)
+        return Ended(names, busy, process.exitcode, complete, end - start, after_loop, load)
 
 
 def _ended(
-    process: subprocess.Popen[bytes], pattern: tuple[signal.Signals, ...], gap: float
+    process: ForkProcess, pattern: tuple[signal.Signals, ...], gap: float
 ) -> tuple[float, float]:
     """Send the signals; the times of the first and of the end, on the clock of the log, [s]."""
     start = time.time()
-    process.send_signal(pattern[0])
+    _send(process, pattern[0])
     for number in pattern[1:]:
-        _wait_at_most(process, gap)
-        process.send_signal(number)
-    process.wait(_ENDS_WITHIN_S)
+        process.join(gap)
+        _send(process, number)
+    process.join(_ENDS_WITHIN_S)
     return start, time.time()
+
+
+def _send(process: ForkProcess, number: signal.Signals) -> None:
+    if process.is_alive() and process.pid is not None:
+        os.kill(process.pid, number)
 
 
 def _wanted_cores() -> int:
@@ -202,33 +235,32 @@ def _wanted_cores() -> int:
     return int(Path('/proc/loadavg').read_text('ascii').split()[3].split('/')[0]) - 1
 
 
-def _recording(bag: Path, log: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, '-m', 'nanorocks_ros.nodes', 'pipeline', '--ros-args']
+def _recording(bag: Path, log: Path) -> ForkProcess:
+    process = get_context('fork').Process(target=_record, args=(bag, log))
+    process.start()
+    return process
+
+
+def _record(bag: Path, log: Path) -> None:
+    """Be the pipeline, from now on."""
+    with log.open('wb') as stream, open(os.devnull, 'wb') as nothing:
+        os.dup2(stream.fileno(), sys.stderr.fileno())
+        os.dup2(nothing.fileno(), sys.stdout.fileno())
+    os.environ.setdefault('ROS_DOMAIN_ID', _DOMAIN)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    sys.argv = ['pipeline', '--ros-args']
     for parameter in ('source:=simulator', 'duration:=600.0', f'record:={bag}'):
-        command += ['-p', parameter]
-    environment = {
-        'ROS_DOMAIN_ID': _DOMAIN,
-        **os.environ,
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-    }
-    with log.open('wb') as stream:
-        return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=stream)
+        sys.argv += ['-p', parameter]
+    main_of_node('pipeline')
 
 
-def _await(bag: Path, process: subprocess.Popen[bytes]) -> None:
+def _await(bag: Path, process: ForkProcess) -> None:
     """Wait until the recording has begun."""
     end = time.monotonic() + _STARTS_WITHIN_S
     while not list(bag.glob('*.mcap')):
-        if process.poll() is not None or time.monotonic() > end:
-            raise RuntimeError(f'the pipeline did not record (exit code {process.poll()})')
+        if not process.is_alive() or time.monotonic() > end:
+            raise RuntimeError(f'the pipeline did not record (exit code {process.exitcode})')
         time.sleep(_CHECK_S)
-
-
-def _wait_at_most(process: subprocess.Popen[bytes], seconds: float) -> None:
-    try:
-        process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        return
 
 
 @contextmanager
