@@ -134,6 +134,8 @@ class PipelineNode(NanorocksNode):
             self.topic_monitor.require_single_publisher(topics.RAW.name)
         for tray in self._settings.trays:
             self.outputs.offer(RESULT_TOPICS, tray)
+            if self._source == 'simulator':
+                self.outputs.offer((topics.TRUTH,), tray)
             self.topic_monitor.require_single_publisher(topics.SPEED.of(tray), ONE_SOURCE)
 
     # Stages
