@@ -329,6 +329,10 @@ class PipelineNode(NanorocksNode):
         self.end_recording()
         self.finish()
 
+    def interrupt(self) -> None:
+        """Do not wait until there is room for another frame."""
+        self._background.interrupted = True
+
     def end_helpers(self) -> None:
         """Leave out the frames that wait for the trays; processes end while the bag is written."""
         self._background.close()

@@ -50,6 +50,8 @@ class _Interrupts:
         Whether the process was asked to end.
     first : str
         Name of the first signal; empty before.
+    node : NanorocksNode or None
+        The node that is told.
     exit_immediately : bool
         Whether to exit on the first signal: while a node is built, kernels compile for seconds,
         and there is nothing to clean up.
@@ -58,6 +60,7 @@ class _Interrupts:
     def __init__(self) -> None:
         self.requested = False
         self.first = ''
+        self.node: NanorocksNode | None = None
         self.exit_immediately = False
         self._first_at = 0.0
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -70,6 +73,8 @@ class _Interrupts:
         if not self.requested:
             self.requested, self._first_at = True, now
             self.first = signal.Signals(number).name
+            if self.node is not None:
+                self.node.interrupt()
         elif now - self._first_at > _PATIENCE_S:
             os._exit(128 + number)
 
@@ -174,6 +179,7 @@ def _spin(name: str, interrupts: _Interrupts) -> int:
         ending.callback(node.end_recording)
         ending.callback(node.end_helpers)
         node.check_parameters()
+        interrupts.node = node
         interrupts.exit_immediately = False
         node.start_recording()
         while not node.done and not interrupts.requested:

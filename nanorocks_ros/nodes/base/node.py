@@ -125,6 +125,9 @@ class NanorocksNode(Node):
     def start_recording(self) -> None:
         """Open the recording of a node that makes one; from then on it has to be closed."""
 
+    def interrupt(self) -> None:
+        """Stop waiting: the node is to end. Called by a signal, so that it only sets flags."""
+
     def end_helpers(self) -> None:
         """Ask threads and processes that work for the node to end, and do not wait for it."""
 

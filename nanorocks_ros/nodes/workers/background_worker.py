@@ -29,6 +29,7 @@ Result = TypeVar('Result')
 
 # Frames that may wait: the first takes most of a second, until floor and walls are known.
 _MAX_WAITING = 30
+_CHECK_S = 0.05
 
 
 class BackgroundWorker(Generic[Job, Result]):
@@ -41,6 +42,11 @@ class BackgroundWorker(Generic[Job, Result]):
         Called with each job, in the thread; must not touch ROS.
     deliver : callable
         Called with each result of `work`, in the thread of the node.
+
+    Attributes
+    ----------
+    interrupted : bool
+        Whether the node is to end, so that no more jobs are taken; a signal handler may set it.
     """
 
     def __init__(
@@ -50,6 +56,7 @@ class BackgroundWorker(Generic[Job, Result]):
         self._jobs: queue.Queue[Job | None] = queue.Queue(_MAX_WAITING)
         self._done: deque[Future[Result]] = deque()
         self._closed = False
+        self.interrupted = False
         self._ready = node.create_guard_condition(self.deliver_results)
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -60,8 +67,11 @@ class BackgroundWorker(Generic[Job, Result]):
         return self._jobs.qsize()
 
     def put(self, job: Job) -> None:
-        """Add a job; waits while 30 are waiting."""
-        self._jobs.put(job)
+        """Add a job; waits while 30 are waiting, unless the node is interrupted meanwhile."""
+        while not self.interrupted:
+            with suppress(queue.Full):
+                self._jobs.put(job, timeout=_CHECK_S)
+                return
 
     def drain(self) -> None:
         """Wait until all jobs are done, and deliver the results."""
