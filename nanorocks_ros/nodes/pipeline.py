@@ -121,7 +121,8 @@ class PipelineNode(NanorocksNode):
             warm_up_speed()
             warm_up_clusters()
             warm_up_cooling()
-        for worker in self._workers:
+        for number, worker in enumerate(self._workers):
+            self.tell_progress(f'starting: {number} of {len(self._workers)} processes are ready')
             worker.ready()
         self._adopt(self._settings, self._build(self._settings))
         self.parameters.react_to_changes(self._settings, self._build, self._change)
