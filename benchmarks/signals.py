@@ -67,6 +67,7 @@ _STARTS_WITHIN_S, _ENDS_WITHIN_S = 900.0, 60.0
 _DOMAIN = '77'
 _CHECK_S = 0.005
 _BUSY_PER_CORE = 2
+_SOON_S = 1.0
 # What a node logs when its loop has ended, with the time.
 _LOOP_ENDED = re.compile(r'\[(\d+\.\d+)\] \[nanorocks\.pipeline\]: interrupted by SIG')
 
@@ -124,6 +125,7 @@ def main(arguments: Sequence[str]) -> int:
         print('interrupted; the same command continues', file=sys.stderr)
     runs = [Ended(*outcome) for outcome in done.values()]
     print(table(runs))
+    print(_soon(runs))
     return int(not all(run.good for run in runs))
 
 
@@ -161,6 +163,17 @@ def table(runs: list[Ended]) -> str:
         for busy in sorted({run.busy for run in runs})
     ]
     return '\n'.join(lines)
+
+
+def _soon(runs: list[Ended]) -> str:
+    """How many runs ended soon after the loop."""
+    counts = [
+        f'{sum(run.after_loop < _SOON_S for run in own)} of {len(own)} '
+        f'({"busy" if busy else "quiet"})'
+        for busy in (False, True)
+        if (own := [run for run in runs if run.busy == busy])
+    ]
+    return f'below {_SOON_S:g} s after the loop: {", ".join(counts)}'
 
 
 def _row(names: str, busy: bool, runs: list[Ended]) -> str:
