@@ -22,7 +22,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '--graph',
         action='store_true',
-        help='check the running nodes instead: their topics and incompatible connections',
+        help='check the running nodes instead: what they report, their topics and connections',
     )
     parser.add_argument(
         '--seconds', type=float, default=5.0, help='with --graph: time to listen; default 5'
@@ -67,13 +67,15 @@ def _machine_findings(options: argparse.Namespace) -> list[Finding]:
 
 def _graph_findings(options: argparse.Namespace) -> list[Finding]:
     from nanorocks_ros.errors import ConfigurationError
-    from nanorocks_ros.tools.doctor.examination import examine_graph
+    from nanorocks_ros.tools.doctor import node_processes
+    from nanorocks_ros.tools.doctor.graph_checks import examine_graph
     from nanorocks_ros.tools.doctor.ros_probe_client import graph
 
     if not 0.0 < options.seconds <= 10.0:
         raise ConfigurationError('--seconds', f'{options.seconds:g}', 'give 0.1 to 10')
     _announce('listening')
-    findings = examine_graph(graph(options.seconds))
+    answer = graph(options.seconds)
+    findings = examine_graph(answer, node_processes.running(answer['executables']))
     if not options.json:
         for finding in findings:
             _print(finding)

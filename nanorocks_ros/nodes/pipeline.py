@@ -121,7 +121,8 @@ class PipelineNode(NanorocksNode):
             warm_up_speed()
             warm_up_clusters()
             warm_up_cooling()
-        for worker in self._workers:
+        for number, worker in enumerate(self._workers):
+            self.tell_progress(f'starting: {number} of {len(self._workers)} processes are ready')
             worker.ready()
         self._adopt(self._settings, self._build(self._settings))
         self.parameters.react_to_changes(self._settings, self._build, self._change)
@@ -134,6 +135,8 @@ class PipelineNode(NanorocksNode):
             self.topic_monitor.require_single_publisher(topics.RAW.name)
         for tray in self._settings.trays:
             self.outputs.offer(RESULT_TOPICS, tray)
+            if self._source == 'simulator':
+                self.outputs.offer((topics.TRUTH,), tray)
             self.topic_monitor.require_single_publisher(topics.SPEED.of(tray), ONE_SOURCE)
 
     # Stages
@@ -271,8 +274,7 @@ class PipelineNode(NanorocksNode):
             self._recorder.record_camera_info(camera_info)
 
     def end_recording(self) -> None:
-        """Write what waits, and the index; frames that wait for the trays are left out."""
-        self._background.discard_waiting()
+        """Write what waits, and the index."""
         if self._recorder is not None:
             self._recorder.close()
 
@@ -328,12 +330,22 @@ class PipelineNode(NanorocksNode):
         self.end_recording()
         self.finish()
 
+    def interrupt(self) -> None:
+        """Do not wait until there is room for another frame."""
+        self._background.interrupted = True
+
+    def end_helpers(self) -> None:
+        """Leave out the frames that wait for the trays; processes end while the bag is written."""
+        self._background.close()
+        for worker in self._workers:
+            worker.kill()
+        if self._page is not None:
+            self._page.interrupt()
+
     def destroy_node(self) -> None:
-        """End processes and threads before the node that they work for."""
-        # The processes first: then the thread does not wait for what they are doing.
+        """Wait for the processes, before the node that they work for."""
         for worker in self._workers:
             worker.close()
-        self._background.close()
         if self._page is not None:
             self._page.close()
         super().destroy_node()

@@ -1,7 +1,7 @@
 """Checks of ROS for ``nanorocks doctor``, in a process of its own; answers are JSON lines.
 
 ``python -m nanorocks_ros.nodes.probe import`` tells what is imported, ``receive TOPIC COUNT``
-and ``send TOPIC COUNT`` count frames, ``graph SECONDS`` lists the topics of the graph.
+and ``send TOPIC COUNT`` count frames, ``graph SECONDS`` lists nodes and topics of the graph.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import os
 import sys
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.nodes.run import NODES, use_large_segments
@@ -17,6 +18,7 @@ from nanorocks_ros.nodes.run import NODES, use_large_segments
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.node import Node
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -26,6 +28,8 @@ Answer = dict[str, Any]
 _ROWS, _COLUMNS = 1080, 1920
 _DEADLINE_S = 15.0
 _STEP_S = 0.05
+# Reports that may wait: of all nodes of a graph, once a second.
+_REPORTS = 50
 
 
 def _import_ros() -> Answer:
@@ -36,12 +40,15 @@ def _import_ros() -> Answer:
     import sensor_msgs.msg
     import std_msgs.msg
 
+    from nanorocks_ros.nodes.base.typed_messages import typed_problem
+
     packages = (rclpy, diagnostic_msgs, sensor_msgs, std_msgs)
     rclpy.shutdown()
     return {
         'rmw': rclpy.get_rmw_implementation_identifier(),
         'where': os.path.dirname(str(packages[0].__file__)),
         'executables': NODES,
+        'typed': typed_problem(),
     }
 
 
@@ -98,10 +105,15 @@ def _spin_until(node: Node, condition: Callable[[], bool]) -> None:
 
 
 def _list_topics(seconds: float) -> Answer:
-    """Every topic with its publishers and subscriptions, and the pairs that do not match."""
+    """What the nodes say of themselves, and every topic, with the pairs that do not match."""
+    from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.node import Node
 
     node = Node('doctor')
+    reports: dict[str, Answer] = {}
+    node.create_subscription(
+        DiagnosticArray, '/diagnostics', partial(_note_reports, reports), _REPORTS
+    )
     # Names and endpoints are discovered with a heartbeat, every 3 s.
     end = time.monotonic() + seconds
     _spin_until(node, lambda: time.monotonic() > end)
@@ -119,7 +131,25 @@ def _list_topics(seconds: float) -> Answer:
                     'mismatches': _mismatches(publishers, subscriptions),
                 }
             )
-    return {'topics': listed}
+    return {
+        'topics': listed,
+        'reports': [reports[name] for name in sorted(reports)],
+        'executables': NODES,
+    }
+
+
+def _note_reports(reports: dict[str, Answer], message: DiagnosticArray) -> None:
+    """Keep the last report of each node of this package."""
+    for status in message.status:
+        if status.hardware_id == 'nanorocks':
+            reports[status.name] = {
+                'node': status.name,
+                'level': int.from_bytes(status.level, 'little'),
+                'message': status.message,
+                'further': [
+                    pair.value for pair in status.values if pair.key.startswith('problem ')
+                ],
+            }
 
 
 def _of_others(node: Node, endpoints: Sequence[TopicEndpointInfo]) -> list[TopicEndpointInfo]:

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from importlib import import_module, resources
 from typing import TYPE_CHECKING, NoReturn
 
@@ -48,6 +48,10 @@ class _Interrupts:
     ----------
     requested : bool
         Whether the process was asked to end.
+    first : str
+        Name of the first signal; empty before.
+    node : NanorocksNode or None
+        The node that is told.
     exit_immediately : bool
         Whether to exit on the first signal: while a node is built, kernels compile for seconds,
         and there is nothing to clean up.
@@ -55,6 +59,8 @@ class _Interrupts:
 
     def __init__(self) -> None:
         self.requested = False
+        self.first = ''
+        self.node: NanorocksNode | None = None
         self.exit_immediately = False
         self._first_at = 0.0
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -66,6 +72,9 @@ class _Interrupts:
         now = time.monotonic()
         if not self.requested:
             self.requested, self._first_at = True, now
+            self.first = signal.Signals(number).name
+            if self.node is not None:
+                self.node.interrupt()
         elif now - self._first_at > _PATIENCE_S:
             os._exit(128 + number)
 
@@ -163,20 +172,22 @@ def _spin(name: str, interrupts: _Interrupts) -> int:
     node = make_node()
     executor = _executor_for(node)
     executor.add_node(node)
-    try:
+    with ExitStack() as ending:
+        # Each is called, whatever happens to the others; the last one here first.
+        ending.callback(node.destroy_node)
+        ending.callback(executor.shutdown)
+        ending.callback(node.end_recording)
+        ending.callback(node.end_helpers)
         node.check_parameters()
+        interrupts.node = node
         interrupts.exit_immediately = False
         node.start_recording()
         while not node.done and not interrupts.requested:
             executor.spin_once(timeout_sec=_SPIN_S)
-        return node.exit_code
-    finally:
-        try:
-            # First, whatever happens to the rest.
-            node.end_recording()
-        finally:
-            executor.shutdown()
-            node.destroy_node()
+        if interrupts.first:
+            # `python -m benchmarks signals` measures from here.
+            node.get_logger().info(f'interrupted by {interrupts.first}')
+    return node.exit_code
 
 
 def _executor_for(node: NanorocksNode) -> Executor:

@@ -148,10 +148,14 @@ class TrayProcess:
             raise error
         return records
 
-    def close(self) -> None:
-        """End the process, also in the middle of a job."""
-        atexit.unregister(self.close)
+    def kill(self) -> None:
+        """End the process, also in the middle of a job; `close` waits for that."""
         self._process.kill()
+
+    def close(self) -> None:
+        """End the process, and wait until it has ended."""
+        atexit.unregister(self.close)
+        self.kill()
         self._process.join()
         if self._memory is not None:
             # Another thread may be about to write.

@@ -241,6 +241,9 @@ def test_the_page_says_what_it_waits_for(look, serve, results):
     server.expect(1)
     text_is(page, '#link', 'compiling, waiting for the pipeline')
     assert page.locator('#link').get_attribute('data-state') == 'waiting'
+    progress = 'compiling functions, once on this machine: push, 3 so far'
+    server.diagnose([('/nanorocks/pipeline', 0, progress, [])])
+    text_is(page, '#link', progress)
     server.diagnose([('/nanorocks/pipeline', 0, 'working', [])])
     text_is(page, '#link', 'waiting for the first results')
     server.take(results.speeds[-1])

@@ -5,16 +5,25 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from doctor_table import assert_documented
 
 pytest.importorskip('rclpy')
 
 from builtin_interfaces.msg import Time
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Image
 from std_msgs.msg import Float32MultiArray, String
+
+from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
+from nanorocks_ros.nodes.base.typed_messages import typed_problem
+from nanorocks_ros.records import NS
+from nanorocks_ros.wire import topics
 
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 RELIABLE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
@@ -33,6 +42,10 @@ def doctor(graph, *arguments, **variables):
     return finished.returncode, {check['name']: check for check in checks}
 
 
+def assert_told(fault, check):
+    assert_documented(fault, check['status'], check['found'], check['remedy'] or '')
+
+
 def test_frames_are_sent_and_counted(graph):
     code, checks = doctor(graph, AMENT_PREFIX_PATH=sys.prefix)
     assert code == 0, checks
@@ -40,6 +53,8 @@ def test_frames_are_sent_and_counted(graph):
     assert checks['rclpy']['status'] == 'ok'
     assert checks['Fast DDS profile']['status'] == 'ok'
     assert checks['executables']['status'] == 'ok'
+    if typed_problem():
+        assert_told('no typed messages', checks['typed messages'])
 
 
 def test_what_does_not_connect_is_listed_and_the_advice_connects_it(graph):
@@ -56,7 +71,9 @@ def test_what_does_not_connect_is_listed_and_the_advice_connects_it(graph):
     fine, alone = (checks[f'/nanorocks/tray_{k}/cor'] for k in (2, 3))
     deaf, other_type = (checks[f'/nanorocks/tray_{k}/speed'] for k in (1, 4))
     early = checks['/nanorocks/epoch']
-    assert deaf['status'] == early['status'] == other_type['status'] == 'problem'
+    assert_told('an incompatible quality of service', deaf)
+    assert_told('an incompatible quality of service', early)
+    assert_told('a publisher of another type', other_type)
     assert 'no data: /nanorocks/listener -> /nanorocks/cluster_autocorrelator' in deaf['found']
     assert 'reliab' in deaf['found'].lower()
     assert 'transient local' in early['found'].lower()
@@ -95,3 +112,98 @@ def test_a_ros_that_does_not_load_is_a_problem_told_in_one_line(graph, tmp_path)
     assert checks['rclpy']['status'] == 'problem'
     assert checks['rclpy']['found'].endswith('ImportError: librcl.so: not there')
     assert 'frames over loopback' not in checks
+
+
+def test_a_middleware_that_is_not_there_is_named_and_the_advice_removes_it(graph):
+    code, checks = doctor(graph, RMW_IMPLEMENTATION='rmw_none_cpp')
+    assert code == 1
+    assert_told('the middleware is not there', checks['rclpy'])
+    assert checks['rclpy']['remedy'].startswith('unset RMW_IMPLEMENTATION (')
+    code, checks = doctor(graph, RMW_IMPLEMENTATION='')
+    assert code == 0
+    assert checks['rclpy']['status'] == 'ok'
+
+
+def test_a_graph_that_works_has_no_finding_but_its_state(graph):
+    """Neither a camera without camera_info nor a pipeline without a truth is a fault."""
+    start_camera(graph)
+    graph.start('pipeline', 'source:=topic')
+    name = graph.node.resolve_topic_name(topics.SPEED.of(1))
+    graph.until(lambda: graph.node.count_publishers(name) == 1)
+    checks = until_told(graph, lambda checks: '/nanorocks/pipeline' in checks)
+    connections = {name: check for name, check in checks.items() if name.count('/') > 2}
+    assert '/nanorocks/camera/camera_info' in connections
+    assert all(check['status'] == 'ok' for check in connections.values()), connections
+
+
+def start_camera(graph):
+    graph.start('simulator', 'width_px:=240', 'height_px:=240', 'frame_rate:=10.0')
+
+
+def until_told(graph, holds):
+    """Ask until it holds: nodes are discovered and report within seconds."""
+    for _ in range(6):
+        _, checks = doctor(graph, '--graph')
+        if holds(checks):
+            return checks
+    pytest.fail(f'never told: {checks}')
+
+
+def test_a_camera_of_another_name_is_found_and_heard_as_advised(graph):
+    graph.node.create_publisher(Image, '/cam0/image', qos_of(topics.RAW))
+    node = graph.start('preprocessor')
+    raw = graph.node.resolve_topic_name(topics.RAW.name)
+    graph.until(lambda: graph.node.count_subscribers(raw) == 1)
+    checks = until_told(graph, lambda checks: raw in checks and '/cam0/image' in checks)
+    assert_told('a camera of another name', checks[raw])
+    graph.interrupt(node)
+    _, *advice = re.findall(r'with --ros-args (-r) (\S+)', checks[raw]['remedy'])[0]
+    graph.start('preprocessor', arguments=('-r', *advice))
+    graph.until(lambda: graph.node.count_subscribers('/cam0/image') == 1)
+    checks = until_told(graph, lambda checks: '/cam0/image' in checks)
+    assert raw not in checks
+    assert checks['/cam0/image']['status'] == 'ok'
+
+
+def test_a_node_in_another_domain_is_named_and_heard_as_advised(graph):
+    other = str(graph.domain % 100 + 1)
+    node = graph.start('haff_fitter')
+    name = graph.node.resolve_topic_name(topics.COR.of(1))
+    graph.until(lambda: graph.node.count_publishers(name) == 1)
+    named = f'haff_fitter (process {node.pid})'
+    _, checks = doctor(graph, '--graph', ROS_DOMAIN_ID=other)
+    assert_told('another domain', checks[named])
+    (advice,) = re.findall(r'export ROS_DOMAIN_ID=(\d+)', checks[named]['remedy'])
+    _, checks = doctor(graph, '--graph', ROS_DOMAIN_ID=advice)
+    assert named not in checks
+    assert '/nanorocks/haff_fitter' in checks
+
+
+def test_what_a_node_says_of_its_camera_is_told_by_the_doctor_too(graph):
+    camera = graph.node.create_publisher(Image, topics.RAW.name, qos_of(topics.RAW))
+    node = graph.start('preprocessor')
+    graph.until(lambda: camera.get_subscription_count() == 1)
+    told = {}
+
+    def until_said(fault, words):
+        check = until_told(
+            graph,
+            lambda checks: words in checks.get('/nanorocks/preprocessor', {}).get('found', ''),
+        )['/nanorocks/preprocessor']
+        assert_told(fault, check)
+        told[fault] = check
+
+    until_said('the camera is silent', 'no frame for')
+    pixels = np.zeros((240, 240), np.uint16)
+    camera.publish(image_message(NS, 'camera', pixels, 'bayer_rggb16'))
+    until_said('the camera sends another encoding', 'bayer_rggb16')
+    gray = np.full((240, 240), 80, np.uint8)
+    for stamp_ns in (2 * NS, 3 * NS, 2_000_000_000 * NS, 4 * NS):
+        camera.publish(image_message(stamp_ns, 'camera', gray, 'mono8'))
+    until_said('stamps of another clock', 'stamp')
+    node.send_signal(signal.SIGSTOP)
+    named = f'preprocessor (process {node.pid})'
+    assert_told('a node hangs', until_told(graph, lambda checks: named in checks)[named])
+    node.send_signal(signal.SIGCONT)
+    assert graph.interrupt(node).code == 0
+    assert len(told) == 3

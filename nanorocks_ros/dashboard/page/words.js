@@ -148,7 +148,9 @@ export function linkState(state, nodes, trays, silentFor) {
   if (trays.length === 0) return ['waiting', 'waiting for the pipeline'];
   const measured = trays.filter(({ latest: { truth: _, ...results } }) => Object.keys(results).length > 0);
   if (measured.length === 0) {
-    // A node offers its topics first, compiles, and only then tells how it is.
+    // A node that starts tells what it compiles (nodes/base/compile_progress.py), or waits for.
+    const starting = nodes.find(({ text }) => /^(compiling|starting)/.test(text));
+    if (starting) return ['waiting', starting.text];
     return ['waiting', nodes.length === 0 ? 'compiling, waiting for the pipeline' : 'waiting for the first results'];
   }
   const silent = Math.min(...measured.map(silentFor));

@@ -12,8 +12,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 
+from nanorocks_ros.nodes.base.compile_progress import CompileProgress
 from nanorocks_ros.nodes.base.diagnostics import Diagnostics
 from nanorocks_ros.nodes.base.parameters import NodeParameters
+from nanorocks_ros.nodes.base.problems import Level, Problem
 from nanorocks_ros.nodes.base.publishing import QOS_OVERRIDES, Outputs
 from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
 from nanorocks_ros.nodes.base.throttled_callbacks import ThrottledCallbacks
@@ -70,6 +72,7 @@ class NanorocksNode(Node):
         self.topic_monitor = TopicMonitor(self, self.steady_clock)
         self.done = False
         self.exit_code = 0
+        self._compile_progress = CompileProgress(self.tell_progress)
         self.create_timer(_REPORT_S, self._report, clock=self.steady_clock)
 
     def listen(
@@ -107,6 +110,11 @@ class NanorocksNode(Node):
             self.topic_monitor.require_publisher(subscription.topic_name)
         return subscription
 
+    def tell_progress(self, text: str) -> None:
+        """Tell what a start that takes long is at; later reports tell the state again."""
+        self.get_logger().info(text)
+        self.diagnostics.publish([Problem(Level.OK, text)])
+
     def check_parameters(self) -> None:
         """Refuse unknown parameters, once the node is complete.
 
@@ -125,6 +133,12 @@ class NanorocksNode(Node):
     def start_recording(self) -> None:
         """Open the recording of a node that makes one; from then on it has to be closed."""
 
+    def interrupt(self) -> None:
+        """Stop waiting: the node is to end. Called by a signal, so that it only sets flags."""
+
+    def end_helpers(self) -> None:
+        """Ask threads and processes that work for the node to end, and do not wait for it."""
+
     def end_recording(self) -> None:
         """Close the recording of a node that makes one, also twice."""
 
@@ -132,6 +146,11 @@ class NanorocksNode(Node):
         """End the node once the subscriptions have what it published last."""
         self.outputs.wait_until_acknowledged()
         self.done = True
+
+    def destroy_node(self) -> None:
+        """Tell no progress any more."""
+        self._compile_progress.close()
+        super().destroy_node()
 
     def _report(self) -> None:
         self._publisher_events.open()

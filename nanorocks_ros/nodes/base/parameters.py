@@ -113,10 +113,14 @@ class NodeParameters:
             return value
         descriptor = _descriptor(row, read_only=read_only or row.name in _NEVER_CHANGED)
         try:
-            # rclpy cannot tell the type of an empty list: it is declared without a value.
+            # rclpy cannot tell the type of an empty list. Without a value, none of the node could
+            # be dumped: asked for all, it answers with nothing.
+            empty = value == []
             self._node.declare_parameter(
-                name, kind if value == [] else value, descriptor, ignore_override=True
+                name, kind if empty else value, descriptor, ignore_override=True
             )
+            if empty and not descriptor.read_only:
+                self._node.set_parameters([Parameter(name, kind, [])])
         except ParameterException as error:
             reason = str(error).split('Reason: ')[-1]
             raise ConfigurationError(

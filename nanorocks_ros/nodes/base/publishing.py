@@ -106,7 +106,11 @@ class Outputs:
         for topic in offered:
             self.publisher(topic, tray)
             typed = _TYPED_BESIDE.get(topic.name)
-            if typed is not None and not typed_problem():
+            if typed is None:
+                continue
+            if problem := typed_problem():
+                self._node.get_logger().info(problem, once=True)
+            else:
                 self.publisher(typed, tray)
 
     def is_offered(self, topic: Topic) -> bool:
@@ -150,8 +154,6 @@ class Outputs:
     def _publish_array(self, record: ArrayRecord, epoch_ns: int) -> None:
         """Publish a record as an array and, if it is offered and of use, as a typed message."""
         tray = record.tray
-        if problem := typed_problem():
-            self._node.get_logger().info(problem, once=True)
         self.send(ARRAY_TOPICS[type(record)], array_message(record, epoch_ns), tray)
         typed = TYPED_TOPICS[type(record)]
         publisher = self._by_name.get(typed.of(tray))

@@ -17,8 +17,8 @@ IMAGE_TOPICS: dict[type, tuple[tuple[topics.Topic, str], ...]] = {
 """Records that travel as images: topic and field."""
 
 RESULT_TOPICS = (
-    *ARRAY_TOPICS.values(),
+    *(topic for topic in ARRAY_TOPICS.values() if topic is not topics.TRUTH),
     topics.TRACKS,
     *(topic for pairs in IMAGE_TOPICS.values() for topic, _ in pairs),
 )
-"""Everything that the pipeline publishes of a tray."""
+"""Everything that the pipeline measures of a tray."""

@@ -49,6 +49,7 @@ class TopicMonitor:
         self._several: dict[str, str] = {}
         self._wrong_types: dict[str, str] = {}
         self._types: dict[str, str] = {}
+        self._incompatible: dict[str, str] = {}
         self.required: list[str] = []
         self._check_later(self._check_clock)
 
@@ -86,12 +87,19 @@ class TopicMonitor:
         self._types[topic] = type_name
 
     def problems(self) -> list[Problem]:
-        """Wrong types, several publishers, and required topics that nobody publishes, now."""
+        """What is wrong with the topics now.
+
+        Wrong types, incompatible QoS, several publishers, and required topics that nobody
+        publishes.
+        """
         self._check_types()
+        for topic in tuple(self._incompatible):
+            self._check_qos(topic)
         self._check_single_publishers()
         missing = [name for name in self.required if self._node.count_publishers(name) == 0]
         return [
             *(Problem(Level.ERROR, text) for text in self._wrong_types.values()),
+            *(Problem(Level.ERROR, text) for text in self._incompatible.values()),
             *(Problem(Level.WARN, text) for text in self._several.values()),
             *(
                 [Problem(Level.WARN, f'no publisher on {", ".join(missing)}', NO_PUBLISHER)]
@@ -143,8 +151,11 @@ class TopicMonitor:
             self._warn(self._several[name])
 
     def report_incompatible_qos(self, name: str, _: Any) -> None:
-        """Warn that a publisher offers less than this node requests; the middleware calls it."""
-        topic = self._node.resolve_topic_name(name)
+        """Tell that a publisher offers less than this node requests; the middleware calls it."""
+        self._check_qos(self._node.resolve_topic_name(name))
+
+    def _check_qos(self, topic: str) -> None:
+        """Note by which policies a topic does not match, with the remedy, until it does."""
         offered = [
             endpoint.qos_profile for endpoint in self._node.get_publishers_info_by_topic(topic)
         ]
@@ -154,14 +165,21 @@ class TopicMonitor:
             if endpoint.node_name == self._node.get_name()
         ]
         differing = mismatches(offered, requested)
+        if not differing:
+            self._incompatible.pop(topic, None)
+            return
         differences = ', '.join(
             f'{mismatch.policy} {mismatch.offered} but this node requests {mismatch.requested}'
             for mismatch in differing
         )
-        overrides = ', '.join(
-            f'qos_overrides.{topic}.subscription.{mismatch.policy}' for mismatch in differing
+        overrides = ' '.join(
+            f'-p qos_overrides.{topic}.subscription.{mismatch.policy}:={mismatch.offered.lower()}'
+            for mismatch in differing
         )
-        self._warn(f'{topic}: no data, the publisher offers {differences}; set {overrides}')
+        text = f'{topic}: no data, the publisher offers {differences}; set {overrides}'
+        if self._incompatible.get(topic) != text:
+            self._incompatible[topic] = text
+            self._warn(text)
 
     def _check_publishers(self, name: str) -> None:
         if self._node.count_publishers(name) == 0:

@@ -17,7 +17,10 @@ from nanorocks_ros.wire.products import TYPED_TOPICS
 if TYPE_CHECKING:
     from nanorocks_ros.records import ArrayRecord
 
-_BUILD = 'build it from the clone: `colcon build --base-paths . msg_defs`, and source the result'
+_BUILD = (
+    'build it from the clone, with ROS 2 Jazzy sourced: `colcon build --base-paths . msg_defs && '
+    '. install/setup.sh`'
+)
 
 
 @cache

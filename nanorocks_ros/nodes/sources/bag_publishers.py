@@ -33,8 +33,7 @@ _OWN_TOPICS = {
     if topic is not topics.TAKEN
     for tray in _TRAYS
 }
-_COMPUTED = tuple(topic for topic in RESULT_TOPICS if topic is not topics.TRUTH)
-_RESULTS = {topic.absolute(tray) for topic in _COMPUTED for tray in _TRAYS}
+_RESULTS = {topic.absolute(tray) for topic in RESULT_TOPICS for tray in _TRAYS}
 # The stamp of a message that begins with a header, after 4 bytes that tell the byte order.
 _STAMP, _STAMP_OFFSET = '{}iI', 4
 
@@ -99,7 +98,7 @@ class BagPublishers:
         self._publishers[name] = publisher
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
             self.latched.append(name)
-        if own in _COMPUTED:
+        if own in RESULT_TOPICS:
             self.results.append(published)
 
     def send(self, message: BagMessage) -> None:

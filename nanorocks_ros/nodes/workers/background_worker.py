@@ -17,6 +17,8 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from rclpy.exceptions import InvalidHandle
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -27,7 +29,7 @@ Result = TypeVar('Result')
 
 # Frames that may wait: the first takes most of a second, until floor and walls are known.
 _MAX_WAITING = 30
-_JOIN_S = 1.0
+_CHECK_S = 0.05
 
 
 class BackgroundWorker(Generic[Job, Result]):
@@ -40,6 +42,11 @@ class BackgroundWorker(Generic[Job, Result]):
         Called with each job, in the thread; must not touch ROS.
     deliver : callable
         Called with each result of `work`, in the thread of the node.
+
+    Attributes
+    ----------
+    interrupted : bool
+        Whether the node is to end, so that no more jobs are taken; a signal handler may set it.
     """
 
     def __init__(
@@ -48,6 +55,8 @@ class BackgroundWorker(Generic[Job, Result]):
         self._work, self._deliver = work, deliver
         self._jobs: queue.Queue[Job | None] = queue.Queue(_MAX_WAITING)
         self._done: deque[Future[Result]] = deque()
+        self._closed = False
+        self.interrupted = False
         self._ready = node.create_guard_condition(self.deliver_results)
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -58,26 +67,28 @@ class BackgroundWorker(Generic[Job, Result]):
         return self._jobs.qsize()
 
     def put(self, job: Job) -> None:
-        """Add a job; waits while 30 are waiting."""
-        self._jobs.put(job)
+        """Add a job; waits while 30 are waiting, unless the node is interrupted meanwhile."""
+        while not self.interrupted:
+            with suppress(queue.Full):
+                self._jobs.put(job, timeout=_CHECK_S)
+                return
 
     def drain(self) -> None:
         """Wait until all jobs are done, and deliver the results."""
         self._jobs.join()
         self.deliver_results()
 
-    def discard_waiting(self) -> None:
-        """Leave out the jobs that wait, so that a node that ends has the processor for itself."""
+    def close(self) -> None:
+        """Leave out the jobs that wait, and end the thread after the job that it is at.
+
+        Does not wait for that: a node that ends has the processor for itself, as far as it can.
+        """
+        self._closed = True
         with suppress(queue.Empty):
             while True:
                 self._jobs.get_nowait()
                 self._jobs.task_done()
-
-    def close(self) -> None:
-        """End the thread; waiting jobs are not done."""
-        self.discard_waiting()
         self._jobs.put(None)
-        self._thread.join(_JOIN_S)
 
     def deliver_results(self) -> None:
         """Deliver the results so far, in order; an error of `work` is raised here."""
@@ -97,4 +108,8 @@ class BackgroundWorker(Generic[Job, Result]):
                 outcome.set_exception(error)
             self._done.append(outcome)
             self._jobs.task_done()
-            self._ready.trigger()
+            if self._closed:
+                return
+            # The node may be destroyed meanwhile.
+            with suppress(InvalidHandle):
+                self._ready.trigger()

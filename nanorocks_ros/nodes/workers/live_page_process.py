@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import DashboardSettings
 
 _CHECK_S = 1.0
-_ENDS_WITHIN_S = 5.0
+# It has nothing to save.
+_ENDS_WITHIN_S = 0.5
 
 
 class LivePageProcess:
@@ -45,10 +46,13 @@ class LivePageProcess:
                 'above; the pipeline continues without it'
             )
 
-    def close(self) -> None:
-        """End the process, and wait for it."""
+    def interrupt(self) -> None:
+        """Ask the process to end."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
+
+    def close(self) -> None:
+        """Wait until the process, which was asked to, has ended; kill it when that takes long."""
         try:
             self._process.wait(_ENDS_WITHIN_S)
         except subprocess.TimeoutExpired:

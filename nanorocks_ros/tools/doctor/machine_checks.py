@@ -1,14 +1,17 @@
-"""Checks of the machine: disk, shared memory, socket buffers, compiled kernels, OpenCV."""
+"""Checks of the machine: disk, port, shared memory, socket buffers, kernels, OpenCV."""
 
 from __future__ import annotations
 
 import os
 import shutil
+import socket
 import tempfile
 from pathlib import Path
 
 import nanorocks_ros
 from nanorocks_ros.numerics.kernel_cache import cache_root
+from nanorocks_ros.settings import DashboardSettings
+from nanorocks_ros.tools.doctor import node_processes
 from nanorocks_ros.tools.doctor.findings import Finding, Status
 from nanorocks_ros.tools.doctor.package_checks import pip_install
 
@@ -27,6 +30,13 @@ _RECEIVE_BUFFER = Path('/proc/sys/net/core/rmem_max')
 def disk() -> Finding:
     """Free space for recordings in the working folder."""
     folder = Path.cwd()
+    if not _writable(folder):
+        return Finding(
+            name='disk',
+            status=Status.PROBLEM,
+            found=f'{folder} cannot be written',
+            remedy='work in another folder: cd ~',
+        )
     free = shutil.disk_usage(folder).free / _GB
     found = f'{free:.1f} GB free in {folder}'
     if free >= _RECOMMENDED_GB:
@@ -38,6 +48,30 @@ def disk() -> Finding:
         found=f'{found}; a minute of the camera takes about {_MINUTE_GB:g} GB',
         remedy='free some space, or work in another folder',
     )
+
+
+def live_page() -> Finding:
+    """Whether the port of the live page is free, or used by a live page."""
+    name, settings = 'live page', DashboardSettings()
+    where = f'port {settings.port} of {settings.host}'
+    pages = node_processes.running(('dashboard',))
+    with socket.socket() as probe:
+        # As the server does, so that connections that have just ended do not count.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((settings.host, settings.port))
+        except OSError as error:
+            if pages:
+                return Finding(name=name, found=f'{where}: a page runs, process {pages[0].pid}')
+            other = settings.port + 1
+            return Finding(
+                name=name,
+                status=Status.WARNING,
+                found=f'{where}: {error.strerror}',
+                remedy=f'nanorocks dashboard --port {other}; of the pipeline: '
+                f'-p dashboard_port:={other}',
+            )
+    return Finding(name=name, found=f'{where} is free')
 
 
 def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
@@ -59,8 +93,8 @@ def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
         name=name,
         status=Status.PROBLEM if blocked else Status.WARNING,
         found=f'{found}; each node needs {_SEGMENT_GB:g} GB of writable memory',
-        remedy='in a container: docker run --shm-size=1g; elsewhere: delete old '
-        f'{folder}/fastrtps_* while no node runs',
+        remedy='in a container: docker run --shm-size=1g; elsewhere, while no node runs: '
+        f'rm {folder}/fastrtps_* {folder}/sem.fastrtps_*',
     )
 
 

@@ -13,10 +13,12 @@ from typing import IO, Any
 
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.tools.doctor.findings import Finding, Status
+from nanorocks_ros.tools.doctor.ros_checks import has_wheels
 
 _PROBE = (sys.executable, '-m', 'nanorocks_ros.nodes.probe')
 _TIMEOUT_S = 60.0
 _FRAMES = 5
+_RMW = 'RMW_IMPLEMENTATION'
 _LOCAL = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
 
@@ -55,15 +57,43 @@ def _read_answer(process: subprocess.Popen[str]) -> dict[str, Any]:
     )
 
 
-def imported() -> tuple[Finding, tuple[str, ...]]:
+def imported() -> tuple[list[Finding], tuple[str, ...]]:
     """Whether rclpy and the messages can be imported, and the names of the executables."""
     try:
         answer = _read_answer(_start_probe('import'))
     except NanorocksError as error:
+        remedy = _import_remedy() or error.do
         found = f'import failed: {error.what}'
-        return Finding(name='rclpy', status=Status.PROBLEM, found=found, remedy=error.do), ()
+        return [Finding(name='rclpy', status=Status.PROBLEM, found=found, remedy=remedy)], ()
     found = f'imported from {answer["where"]}, with {answer["rmw"]}'
-    return Finding(name='rclpy', found=found), tuple(answer['executables'])
+    return [Finding(name='rclpy', found=found), _typed(answer['typed'])], tuple(
+        answer['executables']
+    )
+
+
+def _import_remedy() -> str:
+    """The remedy where a middleware is chosen that is not there; empty where it is not that."""
+    chosen = os.environ.get(_RMW)
+    if not chosen:
+        return ''
+    try:
+        rmw = _read_answer(_start_probe('import', **{_RMW: ''}))['rmw']
+    except NanorocksError:
+        return ''
+    remedy = f'unset {_RMW} (the nodes are measured with {rmw})'
+    if not has_wheels():
+        remedy += f'; or sudo apt install ros-jazzy-{chosen.replace("_", "-")}'
+    return remedy
+
+
+def _typed(problem: str) -> Finding:
+    """Whether results also go out as typed messages."""
+    name = 'typed messages'
+    if not problem:
+        return Finding(name=name, found='nanorocks_msgs')
+    where, _, what = problem.partition(': ')
+    found, _, remedy = what.partition('; ')
+    return Finding(name=name, status=Status.WARNING, found=f'{where} {found}', remedy=remedy)
 
 
 def loopback() -> Finding:
@@ -112,13 +142,12 @@ def loopback_finding(name: str, sent: dict[str, Any], received: dict[str, Any]) 
     return Finding(name=name, status=Status.PROBLEM, found=found, remedy=remedy)
 
 
-def graph(seconds: float) -> list[dict[str, Any]]:
-    """The topics of the graph: ``name, types, publishers, subscriptions, mismatches``.
+def graph(seconds: float) -> dict[str, Any]:
+    """What runs: ``topics``, ``reports`` of nodes of themselves, and all ``executables``.
 
     Raises
     ------
     NanorocksError
         When the probe fails.
     """
-    topics: list[dict[str, Any]] = _read_answer(_start_probe('graph', f'{seconds:g}'))['topics']
-    return topics
+    return _read_answer(_start_probe('graph', f'{seconds:g}'))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 
@@ -78,21 +80,26 @@ def test_a_camera_or_a_clock_that_nobody_publishes_is_reported(graph):
     assert graph.interrupt(process).code == 0
 
 
-def test_a_publisher_of_incompatible_qos_is_reported_with_both_policies(graph):
+def test_an_incompatible_qos_is_told_while_it_lasts_and_the_advice_removes_it(graph):
+    statuses = []
+    graph.node.create_subscription(
+        DiagnosticArray, '/diagnostics', lambda message: statuses.extend(message.status), 10
+    )
     qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    graph.node.create_publisher(Image, topics.RAW.name, qos)
+    publisher = graph.node.create_publisher(Image, topics.RAW.name, qos)
     process = graph.start('preprocessor')
     graph.until(lambda: 'no data' in graph.output(process))
     (line,) = (line for line in graph.output(process).splitlines() if 'no data' in line)
     assert 'publisher offers reliability BEST_EFFORT but this node requests RELIABLE' in line
+    graph.until(lambda: statuses[-1].level == DiagnosticStatus.ERROR)
+    assert statuses[-1].message in line
+    graph.node.destroy_publisher(publisher)
+    graph.until(lambda: statuses[-1].level == DiagnosticStatus.WARN)
+    assert statuses[-1].message.startswith('no publisher')
     assert graph.interrupt(process).code == 0
-
-
-def test_the_override_that_the_warning_names_solves_the_mismatch(graph):
-    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     publisher = graph.node.create_publisher(Image, topics.RAW.name, qos)
-    name = 'qos_overrides./nanorocks/camera/image_raw.subscription.reliability'
-    process = graph.start('preprocessor', f'{name}:=best_effort')
+    (advice,) = re.findall(r'-p (\S+:=\w+)', line)
+    process = graph.start('preprocessor', advice)
     graph.until(lambda: publisher.get_subscription_count() == 1)
     assert 'no data' not in graph.output(process)
     assert graph.interrupt(process).code == 0

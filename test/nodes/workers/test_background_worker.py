@@ -68,10 +68,34 @@ def test_closing_forgets_what_waits(spun):
         go_on.wait(20.0)
         done.append(number)
 
+    others = set(threading.enumerate())
     background = BackgroundWorker(node, work, lambda _: None)
+    (thread,) = set(threading.enumerate()) - others
     for number in range(5):
         background.put(number)
     assert begun.wait(20.0)
-    threading.Timer(0.2, go_on.set).start()
     background.close()
+    go_on.set()
+    thread.join(20.0)
+    assert not thread.is_alive()
     assert done == [0]
+
+
+def test_an_interrupt_ends_the_wait_for_room(spun):
+    node, _ = spun
+    go_on = threading.Event()
+    background = BackgroundWorker(node, lambda _: go_on.wait(20.0), lambda _: None)
+
+    def interrupt():
+        background.interrupted = True
+
+    threading.Timer(0.2, interrupt).start()
+    taken = 0
+    while not background.interrupted:
+        # Returns also when the queue is full, which it stays.
+        background.put(taken)
+        taken += 1
+    assert 30 <= taken <= 32
+    assert background.waiting == 30
+    background.close()
+    go_on.set()

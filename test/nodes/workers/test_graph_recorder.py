@@ -136,6 +136,23 @@ def test_two_signals_end_the_pipeline_with_a_complete_recording(graph, tmp_path,
     assert bag.topics[CAMERA].count >= 30
 
 
+def test_a_recording_that_cannot_be_completed_gives_exit_code_1(graph, tmp_path):
+    path = tmp_path / 'bag'
+    process = graph.start('pipeline', *SMALL, f'record:={path}')
+    recorded = path / 'bag.mcap'
+    graph.until(lambda: recorded.exists() and recorded.stat().st_size > 20_000)
+    process.send_signal(signal.SIGSTOP)
+    # What follows does not fit on the disk; the few lines of the log do.
+    size = recorded.stat().st_size
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size, size))
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGCONT)
+    finished = graph.wait(process)
+    assert finished.code == 1
+    assert f'{path}: cannot be written' in finished.output
+    assert 'Traceback' not in finished.output
+
+
 def test_a_player_without_pace_loses_nothing_on_its_way_into_a_recording(graph, tmp_path):
     """Frames are kept as they came, and the same ones make the same numbers."""
     path = tmp_path / 'bag'

@@ -5,21 +5,32 @@ from __future__ import annotations
 import importlib.metadata
 import re
 import shutil
+import socket
 import subprocess
 import sys
 import sysconfig
 from collections import namedtuple
 
 import pytest
+from doctor_table import assert_documented
 
-from nanorocks_ros.tools.doctor import machine_checks, package_checks, ros_checks
-from nanorocks_ros.tools.doctor.examination import examine_graph
+from nanorocks_ros.settings import DashboardSettings
+from nanorocks_ros.tools.doctor import (
+    machine_checks,
+    node_processes,
+    package_checks,
+    ros_checks,
+)
 from nanorocks_ros.tools.doctor.findings import Finding, Status, worst
 from nanorocks_ros.tools.doctor.ros_probe_client import loopback_finding
 
 GB = 10**9
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 Usage = namedtuple('Usage', 'total used free')
+
+
+def assert_told(fault, finding):
+    assert_documented(fault, finding.status.value, finding.found, finding.remedy)
 
 
 def with_free(monkeypatch, size):
@@ -33,6 +44,35 @@ def with_free(monkeypatch, size):
 def test_a_full_disk_is_found(monkeypatch, free, status):
     with_free(monkeypatch, free)
     assert machine_checks.disk().status is status
+    if status is Status.PROBLEM:
+        assert_told('the disk is full', machine_checks.disk())
+
+
+def test_a_folder_that_cannot_be_written_is_a_problem(monkeypatch):
+    # Also for root.
+    monkeypatch.chdir('/proc')
+    assert_told('the disk is read-only', machine_checks.disk())
+    monkeypatch.chdir('/tmp')
+    assert machine_checks.disk().remedy != 'work in another folder: cd ~'
+
+
+def test_a_taken_port_is_found_and_the_advised_one_is_free(monkeypatch):
+    with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        taken.bind((DashboardSettings().host, DashboardSettings().port))
+        taken.listen()
+        monkeypatch.setattr(node_processes, 'running', lambda _: [])
+        finding = machine_checks.live_page()
+        assert_told('the port of the page is taken', finding)
+        (port,) = re.findall(r'--port (\d+)', finding.remedy)
+        assert f'dashboard_port:={port}' in finding.remedy
+        with socket.socket() as free:
+            free.bind((DashboardSettings().host, int(port)))
+        # A page of this package that runs is no fault.
+        page = node_processes.NodeProcess(7, 'dashboard', {})
+        monkeypatch.setattr(node_processes, 'running', lambda _: [page])
+        assert machine_checks.live_page().status is Status.OK
+    assert machine_checks.live_page().found.endswith('is free')
 
 
 def test_the_shared_memory_of_a_container_is_too_small(monkeypatch, tmp_path):
@@ -40,6 +80,7 @@ def test_the_shared_memory_of_a_container_is_too_small(monkeypatch, tmp_path):
     finding = machine_checks.shared_memory(tmp_path)
     assert finding.status is Status.PROBLEM
     (size,) = re.findall(r'--shm-size=(\d+)g', finding.remedy)
+    assert_told('shared memory is full', finding)
     with_free(monkeypatch, int(size) * GB)
     assert machine_checks.shared_memory(tmp_path).status is Status.OK
 
@@ -51,6 +92,7 @@ def test_small_socket_buffers_matter_between_machines_only(monkeypatch, tmp_path
     finding = machine_checks.receive_buffer(limit)
     assert finding.status is Status.WARNING
     (size,) = re.findall(r'sysctl -w net.core.rmem_max=(\d+)', finding.remedy)
+    assert_told('socket buffers are small', finding)
     limit.write_text(size)
     assert machine_checks.receive_buffer(limit).status is Status.OK
     limit.write_text('212992\n')
@@ -67,6 +109,7 @@ def test_kernels_that_cannot_be_cached_are_found(monkeypatch, tmp_path):
     finding = machine_checks.compiled_kernels()
     assert finding.status is Status.WARNING
     assert 'NUMBA_CACHE_DIR' in finding.remedy
+    assert_told('compiled functions cannot be kept', finding)
 
 
 def installed_as(monkeypatch, **versions):
@@ -88,6 +131,7 @@ def test_an_outdated_library_is_a_warning_whose_advice_installs_what_is_tested(m
     everything = package_checks.libraries()[0]
     assert everything.status is Status.WARNING
     assert 'mcap 0.1 is not tested, >=1.2.1 is' in everything.found
+    assert_told('a library is older than tested (numba, OpenCV)', everything)
     assert everything.remedy == "pip install 'mcap>=1.2.1'"
     # The oldest that this installs satisfies the check.
     installed_as(monkeypatch, mcap=everything.remedy.partition('>=')[2].rstrip("'"))
@@ -99,6 +143,7 @@ def test_a_missing_library_is_a_problem(monkeypatch):
     everything = package_checks.libraries()[0]
     assert everything.status is Status.PROBLEM
     assert 'mcap is not installed; for everything' in everything.found
+    assert_told('a library is missing', everything)
     assert everything.remedy == "pip install 'mcap>=1.2.1'"
 
 
@@ -126,6 +171,7 @@ def test_a_missing_extra_is_a_warning_with_its_purpose(monkeypatch):
     findings = {library.name: library for library in package_checks.libraries()}
     assert findings['extra [parquet]'].status is Status.WARNING
     assert '.parquet' in findings['extra [parquet]'].found
+    assert_told('an extra is missing', findings['extra [parquet]'])
     assert findings['libraries'].status is Status.OK
 
 
@@ -136,6 +182,8 @@ def test_a_missing_extra_is_a_warning_with_its_purpose(monkeypatch):
 def test_an_invalid_domain_is_found(monkeypatch, value, status):
     monkeypatch.setenv('ROS_DOMAIN_ID', value)
     assert ros_checks.domain().status is status
+    if status is Status.PROBLEM:
+        assert_told('a domain that does not exist', ros_checks.domain())
 
 
 @pytest.mark.parametrize(
@@ -146,6 +194,12 @@ def test_the_discovery_range_is_checked(monkeypatch, value, status):
     monkeypatch.delenv('ROS_LOCALHOST_ONLY', raising=False)
     monkeypatch.setenv(RANGE, value)
     assert ros_checks.discovery().status is status
+    faults = {
+        Status.WARNING: 'a discovery range that does not exist',
+        Status.PROBLEM: 'discovery switched off',
+    }
+    if status in faults:
+        assert_told(faults[status], ros_checks.discovery())
 
 
 def test_a_missing_profile_is_a_problem(monkeypatch):
@@ -153,6 +207,7 @@ def test_a_missing_profile_is_a_problem(monkeypatch):
     finding = ros_checks.profile()
     assert finding.status is Status.PROBLEM
     assert '/no/such/profile.xml' in finding.found
+    assert_told('the Fast DDS profile is missing', finding)
 
 
 @pytest.mark.parametrize(
@@ -213,7 +268,7 @@ def test_the_libraries_of_the_wheels_are_found_as_the_advice_says(monkeypatch):
 
 def test_executables_are_found_as_ros2_run_finds_them(monkeypatch, tmp_path):
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/no/such/prefix:{tmp_path}')
-    assert ros_checks.executables(('pipeline',)).status is Status.WARNING
+    assert_told('ros2 run does not find the nodes', ros_checks.executables(('pipeline',)))
     index = tmp_path / 'share/ament_index/resource_index/packages'
     index.mkdir(parents=True)
     (index / 'nanorocks_ros').touch()
@@ -230,40 +285,6 @@ def test_the_worst_finding_is_the_verdict():
     assert worst([]) is Status.OK
     assert worst([ok, warning]) is Status.WARNING
     assert worst([warning, Finding(name='c', found='', status=Status.PROBLEM)]) is Status.PROBLEM
-
-
-def test_two_cameras_on_one_topic_are_found():
-    topic = {
-        'name': '/nanorocks/camera/image_raw',
-        'types': ['sensor_msgs/msg/Image'],
-        'publishers': [{'node': '/nanorocks/simulator'}, {'node': '/nanorocks/bag_player'}],
-        'subscriptions': [{'node': '/nanorocks/preprocessor'}],
-        'mismatches': [],
-    }
-    (finding,) = examine_graph([topic])
-    assert finding.status is Status.WARNING
-    assert 'frames of 2 cameras are mixed' in finding.found
-
-
-def test_results_of_two_pipelines_on_one_topic_are_found():
-    topic = {
-        'name': '/lab/tray_3/speed',
-        'types': ['std_msgs/msg/Float32MultiArray'],
-        'publishers': [{'node': '/lab/pipeline'}, {'node': '/lab/speed_estimator'}],
-        'subscriptions': [{'node': '/lab/dashboard'}],
-        'mismatches': [],
-    }
-    (finding,) = examine_graph([topic])
-    assert finding.status is Status.WARNING
-    assert 'results of 2 nodes are mixed' in finding.found
-    (other,) = examine_graph([{**topic, 'name': '/lab/chatter'}])
-    assert other.status is Status.OK
-
-
-def test_an_empty_graph_names_the_variables_to_compare():
-    (finding,) = examine_graph([])
-    assert finding.status is Status.WARNING
-    assert 'ROS_DOMAIN_ID' in finding.remedy
 
 
 @pytest.mark.parametrize(
