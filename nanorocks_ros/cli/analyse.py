@@ -89,8 +89,8 @@ def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
     name, folder = shlex.quote(films[0]), shlex.quote(results_beside(films[0], 'measured'))
     text = (
         f'{films[0]}: does not say which trays it shows; tray 1 of the flight is assumed; name '
-        f'another: nanorocks analyse {name} --trays 3; or measure a film of your own, with the '
-        f'diameter of a bead in px: nanorocks measure {name} --diameter-px 31 -o {folder}'
+        f'another: nanorocks analyse {name} --trays 3; or measure a film of your own, whose '
+        f'beads are found: nanorocks measure {name} --diameter-px auto -o {folder}'
     )
     print(f'nanorocks: {printable(text)}', file=sys.stderr)
 

@@ -77,7 +77,7 @@ def analyse(
         analysed, notices = [], []
         for path in named_paths(recordings):
             own = recording(path, progress=progress)
-            recorded = settings_of(own.bag, told)
+            recorded = settings_of(own.bag, told, image_topic)
             notices += [*own.notices, *recorded.notices]
             kept = _KeptTracks() if keep_tracks else None
             with count_bar(f'analysing {own.name}', shown=progress) as show:

@@ -37,6 +37,7 @@ class FilmedBeads:
     Parameters
     ----------
     diameter_px : float, [px]
+        NaN: to be found in the film.
     diameter : float or None, [m]
     count : int or None
     density : float or None, [g/cm^3]
