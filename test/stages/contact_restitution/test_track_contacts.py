@@ -16,7 +16,7 @@ from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
 from nanorocks_ros.simulation.shaken_tray import after_shaking
-from nanorocks_ros.studies.measure.track_contacts import track_contacts
+from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 
 TRAY = load_trays()[1]
 SETTINGS = PipelineSettings()
