@@ -121,8 +121,8 @@ def require_measurable(tray: Tray) -> None:
         raise ConfigurationError(
             f'tray {tray.number}',
             f'the trays file does not tell {", ".join(missing)}',
-            'add it (a density under "densities_g_cm3:"), or follow the beads with '
-            '`nanorocks track`',
+            'add it (a density under "densities_g_cm3:"), or measure contacts alone: '
+            '`nanorocks measure FILM`',
         )
 
 

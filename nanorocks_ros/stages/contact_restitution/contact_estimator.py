@@ -24,6 +24,7 @@ from nanorocks_ros.records import (
     Rebound,
     SpeedEstimate,
 )
+from nanorocks_ros.stages.contact_restitution.collision_reach import with_seen_reach
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED
 from nanorocks_ros.stages.stage import RestartingStage
 
@@ -94,6 +95,8 @@ class ContactEstimator(RestartingStage[ContactInput, CorEstimate]):
     def _estimate(self, status: CorStatus) -> CorEstimate:
         cooling = self._settings.cooling
         contacts = [record for record in self._contacts if not isinstance(record, FreeFlight)]
+        if math.isnan(self._tray.dimensions[2]):
+            contacts = with_seen_reach(contacts)
         flights = [record for record in self._contacts if isinstance(record, FreeFlight)]
         alone = contacts_alone(contacts, flights, self._settings.prior, cooling.probability)
         beads, walls = _interval(alone.beads), _interval(alone.walls)

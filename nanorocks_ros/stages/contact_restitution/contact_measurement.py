@@ -177,7 +177,11 @@ class ContactMeasurement(RestartingStage[TrayImage, Measurement]):
         scene = contact_scene(
             list(self._tracks), self._tray, container_known=self._container_known, earlier=earlier
         )
-        self._scene = scene._replace(tracks=())
+        known = scene.acceleration
+        if self._scene is not None and not known.is_seen and self._scene.acceleration.is_seen:
+            # A ball that rolls at last does not fall any more.
+            known = self._scene.acceleration
+        self._scene = scene._replace(tracks=(), acceleration=known)
         return _Search(scene, self._settings)
 
     def _finished(self, search: _Search) -> list[ContactOrFlight]:

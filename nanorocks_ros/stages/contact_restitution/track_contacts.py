@@ -11,6 +11,10 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contacts_alone import ContactsAlone, contacts_alone
 from nanorocks_ros.records import FreeFlight, Measured, PairCollision, Rebound
+from nanorocks_ros.stages.contact_restitution.collision_reach import (
+    ANY_HEIGHT,
+    with_seen_reach,
+)
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
 from nanorocks_ros.stages.contacts.seen_walls import SeenWalls, seen_walls
 from nanorocks_ros.stages.flights.steady_acceleration import (
@@ -80,6 +84,7 @@ def track_contacts(
     tracks : sequence of Tracks
         Of one tray, in order of time.
     tray : Tray
+        Of unknown height: how far collisions are tilted out of the picture follows from them.
     settings : PipelineSettings
     container_known : bool
         Whether the sides of the tray are those of the container. If not, walls are where beads
@@ -111,6 +116,8 @@ class ContactScene(NamedTuple):
     walls : SeenWalls or None
     corner : tuple of 2 floats, [m]
         As of `TrackContacts`.
+    height_told : bool
+        Whether the height of the tray is; else radii follow from the collisions.
     """
 
     tracks: Sequence[Tracks]
@@ -118,6 +125,7 @@ class ContactScene(NamedTuple):
     acceleration: SteadyAcceleration
     walls: SeenWalls | None = None
     corner: tuple[float, float] = (0.0, 0.0)
+    height_told: bool = True
 
     def finder(self, settings: PipelineSettings) -> ContactFinder:
         """A new stage that finds contacts in these tracks."""
@@ -132,9 +140,10 @@ class ContactScene(NamedTuple):
         contacts = [result for result in in_order if not isinstance(result, FreeFlight)]
         flights = [result for result in in_order if isinstance(result, FreeFlight)]
         probability = settings.cooling.probability
+        own = contacts if self.height_told else with_seen_reach(contacts)
         return TrackContacts(
             contacts=tuple(contacts),
-            alone=contacts_alone(contacts, flights, settings.prior, probability),
+            alone=contacts_alone(own, flights, settings.prior, probability),
             acceleration=self.acceleration,
             walls=self.walls,
             frames=frames,
@@ -153,18 +162,18 @@ def contact_scene(
 
     Walls that were seen in `earlier` tracks count where they are not seen in these.
     """
-    if math.isnan(tray.dimensions[2]):
-        # One layer of beads.
-        layer = max(species.diameter_high for species in tray.species)
-        tray = replace(tray, dimensions=(*tray.dimensions[:2], layer))
+    is_told = not math.isnan(tray.dimensions[2])
+    if not is_told:
+        height = ANY_HEIGHT * max(species.diameter_high for species in tray.species)
+        tray = replace(tray, dimensions=(*tray.dimensions[:2], height))
     acceleration = steady_acceleration(tracks)
     if container_known:
-        return ContactScene(tracks, tray, acceleration)
+        return ContactScene(tracks, tray, acceleration, height_told=is_told)
     walls = seen_walls(tracks, tray, acceleration.correction)
     if earlier is not None:
         walls = walls.completed(earlier)
     moved, between, corner = _between(walls, tracks, tray)
-    return ContactScene(moved, between, acceleration, walls, corner)
+    return ContactScene(moved, between, acceleration, walls, corner, is_told)
 
 
 def _between(
