@@ -36,6 +36,7 @@ ALL = (
     'altered_films',
     'ranks',
     'contacts_alone',
+    'short_films',
     'own_tray',
     'python_interface',
     'radii',

@@ -9,7 +9,7 @@ from benchmarks.contacts import tracks_of
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contacts_alone import contacts_alone
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, SimulationSettings
-from nanorocks_ros.studies.measure.track_contacts import track_contacts
+from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 
 PAIRS, WALLS = 0.85, 0.93
 RUNS, FRAMES = 8, 300

@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.cli.remedies import (
     about_own_recording,
     print_notices,
@@ -87,17 +88,16 @@ def run(options: argparse.Namespace) -> int:
 def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
     """Say how films of unknown beads are measured: they do not tell which trays they show."""
     from nanorocks_ros.cli.flags import told_settings
-    from nanorocks_ros.outputs.safe_text import printable
 
     if told_settings(options, options.parameters) & {'trays', 'trays_file'}:
         return
     name, folder = shlex.quote(films[0]), shlex.quote(results_beside(films[0], 'measured'))
     text = (
         f'{films[0]}: does not say which trays it shows; tray 1 of the flight is assumed; name '
-        f'another: nanorocks analyse {name} --trays 3; or measure a film of your own, with the '
-        f'diameter of a bead in px: nanorocks measure {name} --diameter-px 31 -o {folder}'
+        f'another: nanorocks analyse {name} --trays 3; or measure a film of your own, whose '
+        f'beads are found: nanorocks measure {name} --diameter-px auto -o {folder}'
     )
-    print(f'nanorocks: {printable(text)}', file=sys.stderr)
+    tell(text)
 
 
 def _run_one(options: argparse.Namespace) -> int:

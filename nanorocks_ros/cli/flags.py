@@ -175,11 +175,18 @@ def bag_settings(options: argparse.Namespace, bag: str | Path) -> RecordedSettin
         When the bag cannot be read, or what it says of itself cannot be used.
     """
     from nanorocks_ros.experiment.recorded_experiment import recorded_settings
+    from nanorocks_ros.experiment.unknown_diameters import unknown_diameters
     from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 
     settings = settings_from(options, PipelineSettings(), options.parameters)
     told = told_settings(options, options.parameters)
-    return recorded_settings(settings, told, read_metadata(bag), str(bag))
+    notices: tuple[str, ...] = ()
+    if unknown_diameters(settings.trays_file):
+        from nanorocks_ros.studies.measure.found_diameters import with_found_diameters
+
+        settings, notices = with_found_diameters(settings, told, Path(bag), options.image_topic)
+    recorded = recorded_settings(settings, told, read_metadata(bag), str(bag))
+    return recorded._replace(notices=(*notices, *recorded.notices))
 
 
 def _given(options: argparse.Namespace, settings: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.appearance import Appearance, read_appearance
+from nanorocks_ros.experiment.appearance import AUTO, Appearance, read_appearance
 from nanorocks_ros.experiment.film_section import SECTION
 from nanorocks_ros.experiment.materials import (
     GRAM_PER_CUBIC_CENTIMETRE,
@@ -23,6 +23,7 @@ from nanorocks_ros.experiment.materials import (
 from nanorocks_ros.experiment.tray_cells import Polygon
 from nanorocks_ros.experiment.tray_cells import Species as Species
 from nanorocks_ros.experiment.tray_cells import Tray as Tray
+from nanorocks_ros.experiment.unknown_diameters import DIAMETER, FINDING_DIAMETERS
 from nanorocks_ros.experiment.yaml_lines import (
     YamlLines,
     file_content,
@@ -120,8 +121,8 @@ def require_measurable(tray: Tray) -> None:
         raise ConfigurationError(
             f'tray {tray.number}',
             f'the trays file does not tell {", ".join(missing)}',
-            'add it (a density under "densities_g_cm3:"), or follow the beads with '
-            '`nanorocks track`',
+            'add it (a density under "densities_g_cm3:"), or measure contacts alone: '
+            '`nanorocks measure FILM`',
         )
 
 
@@ -234,17 +235,13 @@ class _TrayFile(YamlLines):
 
     def _species(self, node: yaml.Node, sides: list[float]) -> Species:
         entry = self.mapping(
-            node, {'diameter_mm'}, {'material', 'count', 'mass_g', 'look', 'colour'}
+            node, set(), {DIAMETER, 'material', 'count', 'mass_g', 'look', 'colour'}
         )
         appearance = read_appearance(self, entry.get('look'), entry.get('colour'))
         material, appearance = self._material_of(node, entry.get('material'), appearance)
         if 'count' not in entry and appearance is None:
             raise self.error(node, 'lacks count', 'add it, or "look: auto" to find any number')
-        diameters = self._lengths(entry['diameter_mm'])
-        if len(diameters) not in (1, 2) or diameters[0] > diameters[-1]:
-            raise self.error(
-                entry['diameter_mm'], f'diameter {diameters}', 'give one, or the lower and upper'
-            )
+        diameters = self._diameters(node, entry.get(DIAMETER))
         mass = entry.get('mass_g')
         fitting = min(_MAX_UNCOUNTED, max(1, int(math.prod(sides[:2]) / diameters[0] ** 2)))
         return Species(
@@ -256,6 +253,14 @@ class _TrayFile(YamlLines):
             counted='count' in entry,
             appearance=appearance,
         )
+
+    def _diameters(self, node: yaml.Node, told: yaml.Node | None) -> list[float]:
+        if told is None or (isinstance(told, yaml.ScalarNode) and told.value == AUTO):
+            raise self.error(node, f'lacks {DIAMETER}', f'add it; {FINDING_DIAMETERS}')
+        diameters = self._lengths(told)
+        if len(diameters) not in (1, 2) or diameters[0] > diameters[-1]:
+            raise self.error(told, f'diameter {diameters}', 'give one, or the lower and upper')
+        return diameters
 
     def _material_of(
         self, node: yaml.Node, name: yaml.Node | None, appearance: Appearance | None

@@ -78,7 +78,7 @@ def analyse(
         notices: list[str] = []
         for path in named_paths(recordings):
             own = recording(path, progress=progress)
-            recorded = settings_of(own.bag, told)
+            recorded = settings_of(own.bag, told, image_topic)
             notices += own.named((*own.notices, *recorded.notices))
             kept = _KeptTracks() if keep_tracks else None
             with count_bar(f'analysing {own.name}', shown=progress) as show:

@@ -18,6 +18,7 @@ from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.settings import PipelineSettings, rows, with_values
 from nanorocks_ros.studies.film_import.film_cache import cached_import, is_film
 from nanorocks_ros.studies.film_import.named_film import check_film_or_bag
+from nanorocks_ros.studies.measure.found_diameters import with_found_diameters
 from nanorocks_ros.studies.measure.told_film import described_film
 
 if TYPE_CHECKING:
@@ -31,8 +32,8 @@ class FilmDescription(TypedDict, total=False):
 
     Parameters
     ----------
-    diameter_px : float, [px]
-        Of the beads in the picture; needed.
+    diameter_px : float or 'auto', [px]
+        Of the beads in the picture; needed; "auto": found in the film.
     diameter_mm : float, [mm]
         Of the beads; gives the scale.
     count : int
@@ -53,7 +54,7 @@ class FilmDescription(TypedDict, total=False):
         Inner height of the container, along the line of sight.
     """
 
-    diameter_px: float | Sequence[float]
+    diameter_px: float | str | Sequence[float | str]
     diameter_mm: float | Sequence[float]
     count: int | Sequence[int]
     look: str | Sequence[str]
@@ -69,7 +70,7 @@ class FilmDescription(TypedDict, total=False):
 class ToldByKeywords:
     """A description as the studies want it: lists for species, None where nothing is told."""
 
-    diameter_px: Sequence[float] | None = None
+    diameter_px: Sequence[float | str] | None = None
     diameter_mm: Sequence[float] | None = None
     count: Sequence[int] | None = None
     look: Sequence[str] | None = None
@@ -161,7 +162,7 @@ def told_settings(
     return told
 
 
-def settings_of(bag: Path, told: Mapping[str, Any]) -> RecordedSettings:
+def settings_of(bag: Path, told: Mapping[str, Any], image_topic: str = '') -> RecordedSettings:
     """Settings of the pipeline: what is told, else what the recording says, else defaults.
 
     Raises
@@ -174,7 +175,9 @@ def settings_of(bag: Path, told: Mapping[str, Any]) -> RecordedSettings:
     settings = with_values(PipelineSettings(), told, 'settings')
     names = {row.deprecated: row.name for row in rows(settings) if row.deprecated}
     current = {names.get(name, name) for name in told}
-    return recorded_settings(settings, current, read_metadata(bag), str(bag))
+    settings, notices = with_found_diameters(settings, current, bag, image_topic)
+    recorded = recorded_settings(settings, current, read_metadata(bag), str(bag))
+    return recorded._replace(notices=(*notices, *recorded.notices))
 
 
 class DescribedFilm(NamedTuple):
@@ -220,7 +223,7 @@ def described(
     if tray is not None:
         told['trays_file'] = tray.text
         notices += tray.notices
-    recorded = settings_of(own.bag, told)
+    recorded = settings_of(own.bag, told, image_topic)
     return DescribedFilm(own, recorded, own.named(notices + recorded.notices))
 
 

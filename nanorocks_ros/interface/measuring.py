@@ -80,7 +80,7 @@ def measure(
             raise ConfigurationError(
                 own.recording.name,
                 'nothing is told of its beads',
-                'give their diameter in the picture, as diameter_px=31, or a trays_file',
+                'give their diameter in the picture, as diameter_px=31 or "auto", or a trays_file',
             )
         plan = MeasurePlan(
             bag=own.recording.bag,

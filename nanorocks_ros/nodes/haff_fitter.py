@@ -7,20 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import CYCLE_GOES_ON
+from nanorocks_ros.nodes.base.told_settings import default_settings
 from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
+from nanorocks_ros.pipeline.open_trays import estimator_of
 from nanorocks_ros.pipeline.warm_up import warm_up_cooling
 from nanorocks_ros.records import FreeFlight, Merge, PairCollision, Rebound, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
-from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array
 
 if TYPE_CHECKING:
     from std_msgs.msg import Float32MultiArray
 
+    from nanorocks_ros.stages.contact_restitution.contact_estimator import ContactEstimator
+    from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
     from nanorocks_ros.wire.topics import Topic
+
+    Estimators = dict[int, RestitutionEstimator | ContactEstimator]
 
 _INPUTS = (
     (topics.SPEED, SpeedEstimate),
@@ -38,7 +43,7 @@ class HaffFitterNode(NanorocksNode):
 
     def __init__(self) -> None:
         super().__init__('haff_fitter')
-        self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
+        self._settings = self.parameters.declare(default_settings(self), read_only=False)
         self._stages = self._build(self._settings)
         self.diagnostics.note_priors(self._settings.prior)
         self.parameters.react_to_changes(self._settings, self._build, self._change)
@@ -53,15 +58,12 @@ class HaffFitterNode(NanorocksNode):
                 # Without tracks there are speeds, but no contacts.
                 self.listen(topic, receive, tray, required=record_type is SpeedEstimate)
 
-    def _build(self, settings: PipelineSettings) -> dict[int, RestitutionEstimator]:
+    def _build(self, settings: PipelineSettings) -> Estimators:
         return {
-            number: RestitutionEstimator(settings, tray)
-            for number, tray in trays_of(settings).items()
+            number: estimator_of(settings, tray) for number, tray in trays_of(settings).items()
         }
 
-    def _change(
-        self, before: PipelineSettings, after: PipelineSettings, _: dict[int, RestitutionEstimator]
-    ) -> str:
+    def _change(self, before: PipelineSettings, after: PipelineSettings, _: Estimators) -> str:
         if Part.RESTITUTION in changed_parts(before, after):
             for stage in self._stages.values():
                 stage.adopt(after)

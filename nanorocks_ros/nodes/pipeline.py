@@ -13,6 +13,7 @@ from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.base.problems import Level, Problem
 from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
+from nanorocks_ros.nodes.base.told_settings import default_settings
 from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.sources.bag_source import (
     open_bag_frames,
@@ -83,7 +84,7 @@ class PipelineNode(NanorocksNode):
         declare = self.parameters.declare
         self._source = declare(st.SourceSettings()).source
         self._bag_settings = declare(st.BagSettings())
-        self._defaults = st.PipelineSettings()
+        self._defaults = default_settings(self)
         if self._source == 'bag':
             # What is told to the node replaces what the bag says.
             self._defaults = settings_of_bag(self, self._bag_settings)
@@ -144,7 +145,7 @@ class PipelineNode(NanorocksNode):
     def _build(self, settings: st.PipelineSettings) -> Pipeline:
         if self._workers:
             return SharedPipeline(settings, self._camera_name, self._view, self._workers)
-        return Pipeline(settings, self._camera_name, self._view)
+        return Pipeline(settings, self._camera_name, self._view, contacts_suffice=True)
 
     def _change(
         self, before: st.PipelineSettings, after: st.PipelineSettings, pipeline: Pipeline

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
+from nanorocks_ros.nodes.base.told_settings import default_settings
 from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.sources.camera_subscription import CameraSubscription
 from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
@@ -25,7 +26,7 @@ class PreprocessorNode(NanorocksNode):
 
     def __init__(self) -> None:
         super().__init__('preprocessor')
-        self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
+        self._settings = self.parameters.declare(default_settings(self), read_only=False)
         for tray in self._settings.trays:
             self.outputs.offer((topics.STATE, topics.GRAY, topics.RECTIFIED), tray)
             self.topic_monitor.require_single_publisher(topics.STATE.of(tray), ONE_SOURCE)

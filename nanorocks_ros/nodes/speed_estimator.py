@@ -9,7 +9,7 @@ from typing import Any
 
 from nanorocks_ros.nodes.trays.tray_stage_node import TrayStageNode
 from nanorocks_ros.pipeline.changed_settings import Part
-from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
+from nanorocks_ros.pipeline.open_trays import measurement_of
 from nanorocks_ros.wire import topics
 
 _OUTPUTS = (
@@ -29,7 +29,7 @@ class SpeedEstimatorNode(TrayStageNode):
 
     def __init__(self) -> None:
         super().__init__(
-            'speed_estimator', TrayMeasurement, _OUTPUTS, part=Part.MEASUREMENT, in_color=True
+            'speed_estimator', measurement_of, _OUTPUTS, part=Part.MEASUREMENT, in_color=True
         )
 
     def select_images(self, stage: Any, tray: int) -> None:

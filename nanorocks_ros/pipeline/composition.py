@@ -14,6 +14,7 @@ from nanorocks_ros.experiment.trays import (
     tray_by_number,
 )
 from nanorocks_ros.pipeline.changed_settings import Part
+from nanorocks_ros.pipeline.open_trays import OpenMeasurement, reason_for_contacts
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement, TrayRecord
 from nanorocks_ros.records import (
     ArrayRecord,
@@ -30,6 +31,10 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
+from nanorocks_ros.stages.contact_restitution.contact_estimator import (
+    ContactEstimator,
+    ContactInput,
+)
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.restitution.restitution_estimator import (
     RestitutionEstimator,
@@ -84,6 +89,13 @@ class TrayStages:
         self.restitution = RestitutionEstimator(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
 
+    @classmethod
+    def of(cls, settings: PipelineSettings, tray: Tray) -> TrayStages | OpenTrayStages:
+        """The stages of a tray, whatever is known of it."""
+        if reason_for_contacts(settings, tray):
+            return OpenTrayStages(settings, tray)
+        return cls(settings, tray)
+
     def adopt(self, settings: PipelineSettings, parts: Part) -> None:
         """Take other settings of clusters and restitution; the measurement goes on.
 
@@ -134,6 +146,47 @@ class TrayStages:
         return records
 
 
+class OpenTrayStages:
+    """The stages behind the images of a tray of which only contacts are measured.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    tray : Tray
+    """
+
+    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
+        reason = reason_for_contacts(settings, tray)
+        self.measurement = OpenMeasurement(settings, tray, reason)
+        self.restitution = ContactEstimator(settings, tray)
+
+    def adopt(self, settings: PipelineSettings, parts: Part) -> None:
+        """See `TrayStages.adopt`."""
+        if Part.RESTITUTION in parts:
+            self.restitution.adopt(settings)
+
+    def emit(self, wanted: Wanted) -> None:
+        """Choose the pictures to make from now on."""
+        self.measurement.emit_tracks = wanted.tracks
+
+    def push(self, image: TrayImage) -> tuple[Result, ...]:
+        """Everything that follows from the next image of the tray."""
+        return tuple(self._estimates(self.measurement.push(image)))
+
+    def flush(self) -> tuple[Result, ...]:
+        """Everything that is held back when the images end."""
+        return (*self._estimates(self.measurement.flush()), *self.restitution.flush())
+
+    def _estimates(self, measured: Iterable[Result]) -> list[Result]:
+        """The records measured, each with the estimate that follows from it."""
+        results: list[Result] = []
+        for record in measured:
+            results.append(record)
+            if isinstance(record, ContactInput):
+                results += self.restitution.push(record)
+        return results
+
+
 class Pipeline:
     """All stages for all trays of the settings.
 
@@ -144,6 +197,9 @@ class Pipeline:
         Name of the source of the frames in errors.
     view : View, optional
         The lens, from camera_info.
+    contacts_suffice : bool
+        Whether only contacts are measured of a tray whose decay cannot be read; else such a tray
+        is refused.
 
     Raises
     ------
@@ -151,13 +207,31 @@ class Pipeline:
         When the settings cannot be used.
     """
 
-    def __init__(self, settings: PipelineSettings, camera: str, view: View | None = None) -> None:
+    def __init__(
+        self,
+        settings: PipelineSettings,
+        camera: str,
+        view: View | None = None,
+        *,
+        contacts_suffice: bool = False,
+    ) -> None:
         settings = calibrated(settings)
         trays = trays_of(settings)
-        for tray in trays.values():
-            require_measurable(tray)
+        if not contacts_suffice:
+            for tray in trays.values():
+                require_measurable(tray)
         self.preprocessor = Preprocessor(settings, trays, camera, view)
-        self.trays = {number: TrayStages(settings, tray) for number, tray in trays.items()}
+        make = TrayStages.of if contacts_suffice else TrayStages
+        self.trays = {number: make(settings, tray) for number, tray in trays.items()}
+
+    @property
+    def cooling_trays(self) -> dict[int, TrayStages]:
+        """The stages of the trays whose decay is read."""
+        return {
+            number: stages
+            for number, stages in self.trays.items()
+            if isinstance(stages, TrayStages)
+        }
 
     def prepare(self) -> None:
         """Prepare for the first frame, so that it need not wait."""

@@ -81,7 +81,7 @@ class SharedPipeline(Pipeline):
         view: View | None,
         workers: Sequence[TrayProcess],
     ) -> None:
-        super().__init__(settings, camera, view)
+        super().__init__(settings, camera, view, contacts_suffice=True)
         self._settings = calibrated(settings)
         self._workers = workers
         self._shares = shares_of(tuple(trays_of(self._settings).values()), len(workers))

@@ -22,7 +22,7 @@ import numpy as np
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.trays import Tray
 from nanorocks_ros.pipeline.changed_settings import Part
-from nanorocks_ros.pipeline.composition import Result, TrayStages, Wanted
+from nanorocks_ros.pipeline.composition import OpenTrayStages, Result, TrayStages, Wanted
 from nanorocks_ros.pipeline.warm_up import warm_up_clusters, warm_up_cooling, warm_up_speed
 from nanorocks_ros.records import TrayImage
 from nanorocks_ros.settings import PipelineSettings
@@ -252,7 +252,7 @@ class _Worker:
     """The stages of some trays."""
 
     def __init__(self) -> None:
-        self._trays: dict[int, TrayStages] = {}
+        self._trays: dict[int, TrayStages | OpenTrayStages] = {}
         self._memory: SharedMemory | None = None
 
     def take(self, job: str | _Job) -> TrayRecords:
@@ -262,7 +262,7 @@ class _Worker:
             return {}
         if job.stages is not None:
             settings, trays = job.stages
-            self._trays = {tray.number: TrayStages(settings, tray) for tray in trays}
+            self._trays = {tray.number: TrayStages.of(settings, tray) for tray in trays}
         if job.change is not None:
             for tray_stages in self._trays.values():
                 tray_stages.adopt(*job.change)

@@ -12,6 +12,7 @@ from nanorocks_ros.records.cluster_estimates import BodyEstimate as BodyEstimate
 from nanorocks_ros.records.cluster_estimates import ClusterEstimate as ClusterEstimate
 from nanorocks_ros.records.cluster_estimates import Merge as Merge
 from nanorocks_ros.records.cluster_estimates import sizes_disagree as sizes_disagree
+from nanorocks_ros.records.contact_records import WALL_NAMES as WALL_NAMES
 from nanorocks_ros.records.contact_records import Contact as Contact
 from nanorocks_ros.records.contact_records import ContactOrFlight as ContactOrFlight
 from nanorocks_ros.records.contact_records import FreeFlight as FreeFlight

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records.values import Measured
 
+WALL_NAMES = 'left', 'right', 'top', 'bottom'
+"""Of the walls 0 to 3, as they lie in the picture."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rebound:

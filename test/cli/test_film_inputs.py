@@ -57,7 +57,7 @@ def test_analyse_says_first_how_a_film_of_unknown_beads_is_measured(tmp_path, ca
     use_imports(build_parser().parse_args(['analyse', str(film)]))
     lines = capsys.readouterr().err.splitlines()
     assert 'does not say which trays it shows' in lines[0]
-    assert f"nanorocks measure '{film}' --diameter-px 31 -o 'my film_measured'" in lines[0]
+    assert f"nanorocks measure '{film}' --diameter-px auto -o 'my film_measured'" in lines[0]
     assert f"nanorocks analyse '{film}' --trays 3" in lines[0]
     assert 'imported, 4 frames' in lines[-1]
 

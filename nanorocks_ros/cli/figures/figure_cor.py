@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.cli.parsing.tray_options import add_tray
 from nanorocks_ros.cli.remedies import print_notices
 from nanorocks_ros.errors import ConfigurationError
@@ -104,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         bars[name].update(done, total)
 
     def notice(text: str) -> None:
-        print(f'nanorocks: {text}', file=sys.stderr)
+        tell(text)
 
     try:
         values = cor_figures(
@@ -166,7 +167,7 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
     with Progress('analysing') as progress:
         analysis = analyse(bag, settings, progress=progress.count, scratch=scratch)
     for notice in analysis.notices:
-        print(f'nanorocks: {notice}', file=sys.stderr)
+        tell(notice)
     write_results(analysis, folder, bag, settings)
     return folder
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.experiment.appearance import AUTO
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -15,13 +17,14 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
     """Add the options; each species of beads has its diameter, count and density."""
     group = parser.add_argument_group('the film, in place of a trays file')
     several: dict[str, Any] = {'type': float, 'nargs': '+'}
-    for unit, where in (('px', ' in the picture'), ('mm', '')):
-        group.add_argument(
-            f'--diameter-{unit}',
-            metavar=unit.upper(),
-            help=f'diameter of the beads{where}',
-            **several,
-        )
+    group.add_argument(
+        '--diameter-px',
+        type=_size,
+        nargs='+',
+        metavar='PX',
+        help='diameter of the beads in the picture; auto: found in the film',
+    )
+    group.add_argument('--diameter-mm', metavar='MM', help='diameter of the beads', **several)
     group.add_argument('--count', type=int, nargs='+', metavar='N', help='number of beads')
     group.add_argument(
         '--look', nargs='+', metavar='LOOK', help='dark, bright or auto (default), on the floor'
@@ -54,6 +57,14 @@ def add_film_options(parser: argparse.ArgumentParser) -> None:
         metavar='MM',
         help='inner height of the container, along the line of sight; the diameter for one layer',
     )
+
+
+def _size(word: str) -> float | str:
+    return word if word == AUTO else float(word)
+
+
+# Its name is in the error of a word that is no number.
+_size.__name__ = 'float'
 
 
 def leave_out_film_options(parser: CommandParser) -> None:

@@ -116,8 +116,9 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
         raise ConfigurationError(
             options.named[0],
             'nothing is told of its beads',
-            f'give their diameter in the picture: nanorocks measure {film} --diameter-px 31 -o '
-            f'{shlex.quote(options.output)}; or a file, as --trays-file mine.yaml',
+            f'have their diameter found: nanorocks measure {film} --diameter-px auto -o '
+            f'{shlex.quote(options.output)}; or give it in px, or a file, as --trays-file '
+            'mine.yaml',
         )
     print_notices(recorded.notices, options)
     return recorded

@@ -5,12 +5,14 @@ Tested by ``test/cli/films/test_tray.py``.
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.appearance import AUTO
 
 if TYPE_CHECKING:
     import argparse
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.measure.film_samples import FilmSamples
     from nanorocks_ros.studies.measure.film_tray import FilmedTray
     from nanorocks_ros.studies.measure.seen_beads import SeenBeads
+
+# A number is that of the beads if at least this part of the frames shows it.
+_STEADY = 0.5
 
 
 class RecognisedTray(NamedTuple):
@@ -38,11 +43,15 @@ def recognised_tray(options: argparse.Namespace, samples: FilmSamples) -> Recogn
     """
     from nanorocks_ros.studies.measure.film_tray import described_tray
     from nanorocks_ros.studies.measure.seen_beads import seen_beads
-    from nanorocks_ros.studies.measure.told_film import filmed_tray
+    from nanorocks_ros.studies.measure.told_film import filmed_tray, sized_beads
 
-    guesses = _complete(options, samples)
+    _complete(options)
     filmed = filmed_tray(options)
     assert filmed is not None
+    guesses: tuple[str, ...] = ()
+    if any(math.isnan(beads.diameter_px) for beads in filmed.beads):
+        filmed, guess = sized_beads(filmed, samples)
+        guesses = (guess,)
     if options.bead and len(options.bead) > 1 and not options.colour:
         filmed = _coloured(filmed, options.bead, samples)
     tray = described_tray(filmed, samples.size)
@@ -68,21 +77,15 @@ def save(options: argparse.Namespace, tray: RecognisedTray) -> None:
         _write_picture(Path(options.picture), tray.beads)
 
 
-def _complete(options: argparse.Namespace, samples: FilmSamples) -> tuple[str, ...]:
-    """Put diameters in px into the options: of --bead, or guessed; notices."""
-    from nanorocks_ros.studies.measure.seen_beads import guessed_diameter
-
+def _complete(options: argparse.Namespace) -> None:
+    """Put diameters in px into the options: of --bead, or to be found."""
     if options.bead and options.diameter_px:
         raise ConfigurationError(
             '--bead', 'and --diameter-px both tell the diameter', 'leave out one of them'
         )
     if options.bead:
         options.diameter_px = [diameter for _, _, diameter in options.bead]
-    if options.diameter_px:
-        return ()
-    diameter = guessed_diameter(samples.frames)
-    options.diameter_px = [round(diameter, 2)]
-    return (f'the diameter is guessed: {diameter:.1f} px; --diameter-px sets it',)
+    options.diameter_px = options.diameter_px or [AUTO]
 
 
 def _coloured(filmed: FilmedTray, beads: list[list[float]], samples: FilmSamples) -> FilmedTray:
@@ -98,18 +101,18 @@ def _coloured(filmed: FilmedTray, beads: list[list[float]], samples: FilmSamples
 
 def _with_counts(filmed: FilmedTray, beads: SeenBeads) -> tuple[FilmedTray, tuple[str, ...]]:
     """The numbers that are seen where none are told, and a notice of them."""
+    if all(told.count is not None for told in filmed.beads) or min(beads.counts) < 1:
+        return filmed, ()
+    numbers = ' and '.join(f'{seen:.0f}' for seen in beads.counts)
+    seen_in = f'{numbers}, seen in {100.0 * min(beads.steady):.0f} % of frames; --count sets it'
+    if min(beads.steady) < _STEADY:
+        # As a number that is told it would leave out the others.
+        return filmed, (f'the number of beads is left open: {seen_in}',)
     species = tuple(
-        told if told.count is not None or seen < 1 else replace(told, count=round(seen))
+        replace(told, count=round(seen) if told.count is None else told.count)
         for told, seen in zip(filmed.beads, beads.counts, strict=True)
     )
-    if species == filmed.beads:
-        return filmed, ()
-    numbers = ' and '.join(str(told.count) for told in species)
-    share = min(beads.steady)
-    return replace(filmed, beads=species), (
-        f'the number of beads is guessed: {numbers}, seen in {100.0 * share:.0f} % of '
-        'frames; --count sets it',
-    )
+    return replace(filmed, beads=species), (f'the number of beads is guessed: {seen_in}',)
 
 
 def _write_picture(path: Path, beads: SeenBeads) -> None:

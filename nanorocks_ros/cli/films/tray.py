@@ -109,7 +109,8 @@ def _print(options: argparse.Namespace, beads: SeenBeads) -> None:
         print(json.dumps({'output': options.output, 'species': rows}))
     else:
         for row in rows:
-            print(f'{row["material"]}: {row["seen"]:g} of {row["expected"]} beads seen (median)')
+            told = '' if row['expected'] is None else f' of {row["expected"]}'
+            print(f'{row["material"]}: {row["seen"]:g}{told} beads seen (median)')
         film, output = shlex.quote(options.named[0]), shlex.quote(options.output)
         print(f'next: nanorocks measure {film} --trays-file {output} -o results')
     print(f'nanorocks: trays file in {options.output}', file=sys.stderr)

@@ -35,7 +35,7 @@ const read = (input) => numberIn(input.value);
 function formNow() {
   const marked = species.filter((kind) => kind.marked);
   return {
-    corners: marks.cornersTold ? boxAround(marks.corners) : [],
+    corners: marks.told(),
     sides_mm: [read(at('length')), read(at('width'))],
     height_mm: read(at('height')),
     species: marked.map(({ bead, told }) => ({ bead, ...told })),

@@ -21,18 +21,27 @@ export class Marks {
     this.corners = cornersOf([0, 0, width, height]);
     this.cornersTold = false;
     this.clicking = null;
+    this.clicked = null;
     this.held = null;
   }
 
   setBox(box) {
     this.corners = cornersOf(box);
     this.cornersTold = true;
+    this.clicked = null;
+  }
+
+  /** What is told of the corners: all four as they were clicked, until the box is changed. */
+  told() {
+    if (!this.cornersTold) return [];
+    return this.clicked ? this.clicked.flat() : boxAround(this.corners);
   }
 
   wholePicture() {
     this.corners = cornersOf([0, 0, this.width, this.height]);
     this.cornersTold = false;
     this.clicking = null;
+    this.clicked = null;
   }
 
   /** What is under a pointer; `reach` is a pixel of the screen in pixels of the film. */
@@ -56,6 +65,7 @@ export class Marks {
     this.clicking.push(place.map((value) => Math.round(value)));
     if (this.clicking.length === 4) {
       this.setBox(boxAround(this.clicking));
+      this.clicked = this.clicking;
       this.clicking = null;
       this.changed();
     }
@@ -88,10 +98,13 @@ export class Marks {
     brush.strokeStyle = '#ffc800';
     brush.fillStyle = '#ffc800';
     brush.setLineDash(this.cornersTold ? [] : [6 * scale, 5 * scale]);
-    const [left, top, right, bottom] = boxAround(this.corners);
-    brush.strokeRect(left, top, right - left, bottom - top);
+    const outline = this.clicked ?? this.corners;
+    brush.beginPath();
+    for (const [x, y] of outline) brush.lineTo(x, y);
+    brush.closePath();
+    brush.stroke();
     brush.setLineDash([]);
-    for (const [x, y] of this.clicking ?? this.corners) {
+    for (const [x, y] of this.clicking ?? outline) {
       brush.beginPath();
       brush.arc(x, y, 6 * scale, 0, 2 * Math.PI);
       brush.fill();

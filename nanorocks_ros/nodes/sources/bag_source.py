@@ -6,15 +6,12 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.experiment.recorded_experiment import recorded_settings
 from nanorocks_ros.nodes.base.parameter_checks import command_line_parameters
+from nanorocks_ros.nodes.base.told_settings import completed_settings
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.settings import (
     BagSettings,
     PipelineSettings,
-    rows,
-    with_current_names,
-    with_values,
 )
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 
@@ -92,15 +89,8 @@ def settings_of_bag(node: Node, bag: BagSettings) -> PipelineSettings:
     RecordingError
         When the bag cannot be read, or what it says of its trays cannot be used.
     """
-    defaults = PipelineSettings()
     path = path_of_bag(bag)
-    metadata = read_metadata(path)
-    given = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
-    names = {row.name for row in rows(defaults)}
-    told, _ = with_current_names(defaults, given, f'node {node.get_name()}')
-    told = {name: value for name, value in told.items() if name in names}
-    settings = with_values(defaults, told, f'node {node.get_name()}')
-    completed = recorded_settings(settings, told.keys(), metadata, path)
+    completed = completed_settings(node, read_metadata(path), path)
     for notice in completed.notices:
         node.get_logger().warning(notice)
     return completed.settings

@@ -12,6 +12,7 @@ from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
+from nanorocks_ros.nodes.base.told_settings import default_settings
 from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.trays.image_size_check import ImageSizeCheck
 from nanorocks_ros.nodes.trays.track_images import TrackImages
@@ -65,7 +66,7 @@ class TrayStageNode(NanorocksNode):
         self._part = part
         self._in_color = in_color
         self._make_stage = make_stage
-        self._settings = self.parameters.declare(PipelineSettings(), read_only=False)
+        self._settings = self.parameters.declare(default_settings(self), read_only=False)
         self._epoch = Epoch(self, may_set=False)
         warm_up_counting()
         if in_color:

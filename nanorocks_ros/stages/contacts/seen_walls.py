@@ -51,6 +51,19 @@ class SeenWalls(NamedTuple):
         """Whether a wall is seen."""
         return any(self.turns)
 
+    def completed(self, earlier: SeenWalls) -> SeenWalls:
+        """With walls that were seen earlier where none is seen now."""
+        rows = [
+            before if math.isnan(now[0]) else now
+            for now, before in zip(
+                zip(self.places, self.turns, strict=True),
+                zip(earlier.places, earlier.turns, strict=True),
+                strict=True,
+            )
+        ]
+        places, turns = zip(*rows, strict=True)
+        return SeenWalls(places, turns)
+
 
 def seen_walls(
     tracks: Sequence[Tracks], tray: Tray, acceleration: tuple[float, float] = (0.0, 0.0)

@@ -2,7 +2,9 @@
 
 Short pieces of tracks are fitted with parabolas. A piece with a contact in it is no parabola, so
 that the pieces that are fitted well show free flights; their median does not follow the rest.
-Beads that lie on something do not fall, and hardly move: they are left out.
+Beads that lie on something do not fall, and hardly move: they are left out. So are those that roll
+on something: along the acceleration that others have in common, they keep their place, which a
+free bead does not.
 """
 
 from __future__ import annotations
@@ -35,6 +37,10 @@ _LEAST_PIECES, _MAX_CHI_SQUARE = 6, 3.0
 _LEAST_PATH = 0.5
 # Errors by which an acceleration must differ from 0.
 _SIGMAS = 5.0
+# Largest scatter of the accelerations of curved pieces, over their median, if they have one in
+# common; and path of a bead that is held, along it, over that of one which is thrown up and falls
+# back, the shortest of all free ones.
+_COMMON, _HELD = 0.3, 0.5
 # Normal deviation over the median of absolute deviations; error of a median over that of a mean.
 _MAD, _MEDIAN_ERROR = 1.4826, 1.2533
 
@@ -86,6 +92,7 @@ def steady_acceleration(tracks: Iterable[Tracks]) -> SteadyAcceleration:
         return SteadyAcceleration()
     chi_square = fits[:, 8]
     good = fits[chi_square <= _MAX_CHI_SQUARE * np.quantile(chi_square, 0.25)]
+    good = good[~_are_held(good)]
     if len(good) < _LEAST_PIECES:
         return SteadyAcceleration()
     accelerations = good[:, 5:7]
@@ -95,6 +102,23 @@ def steady_acceleration(tracks: Iterable[Tracks]) -> SteadyAcceleration:
     error = float(spread.max()) * _MEDIAN_ERROR / math.sqrt(0.5 * len(good))
     x, y = median.tolist()
     return SteadyAcceleration(value=(x, y), error=error, pieces=len(good))
+
+
+def _are_held(fits: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Pieces of beads that something keeps from falling with the others."""
+    accelerations, errors = fits[:, 5:7], fits[:, 7]
+    curved = accelerations[np.hypot(*accelerations.T) > _SIGMAS * errors]
+    if len(curved) < _LEAST_PIECES:
+        return np.zeros(len(fits), dtype=bool)
+    common = np.median(curved, axis=0)
+    size = math.hypot(*common.tolist())
+    if _MAD * np.median(np.hypot(*(curved - common).T)) > _COMMON * size:
+        return np.zeros(len(fits), dtype=bool)
+    # Along it, at the ends and in the middle of a piece; the middle is where a free one turns.
+    half = 0.5 * fits[:, 1]
+    speed, bend = np.abs(fits[:, 3:5] @ common) / size, np.abs(accelerations @ common) / size
+    fallen = np.maximum(2.0 * speed * half, speed * half + 0.5 * bend * half**2)
+    return np.asarray(fallen < _HELD * 0.5 * size * half**2)
 
 
 def _by_bead(tracks: Iterable[Tracks]) -> list[NDArray[np.float64]]:

@@ -243,7 +243,7 @@ def analyse(
     pipeline = Pipeline(settings, bag.where, view)
     lessons = scene_frames(Path(path), settings, image_topic=image_topic, progress=progress)
     for number, lesson in lessons.items():
-        pipeline.trays[number].measurement.learn(lesson)
+        pipeline.cooling_trays[number].measurement.learn(lesson)
     truth = bag.truth(epoch_ns)
     result = Analysis(
         epoch_ns=epoch_ns,
@@ -272,7 +272,7 @@ def analyse(
         result.notices.append(f'{bag.where}: {result.refused} frames could not be used')
         result.complete = False
     _keep(result, pipeline.flush())
-    for number, stages in pipeline.trays.items():
+    for number, stages in pipeline.cooling_trays.items():
         result.trays[number].evidence = stages.restitution.evidence
         result.trays[number].sticking = stages.clusters.cycles
         counts = stages.measurement.recognition.counts()

@@ -37,6 +37,7 @@ class FilmedBeads:
     Parameters
     ----------
     diameter_px : float, [px]
+        NaN: to be found in the film.
     diameter : float or None, [m]
     count : int or None
     density : float or None, [g/cm^3]
@@ -67,7 +68,7 @@ class FilmedTray:
     sides : tuple of 2 floats or None, [m]
         Inner length and width of the container, along columns and rows.
     height : float or None, [m]
-        Along the line of sight.
+        Along the line of sight; None: any.
     """
 
     beads: tuple[FilmedBeads, ...]
@@ -118,11 +119,13 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
         scale_known=_is_scale_known(filmed),
         container_known=known and bool(filmed.corners_px),
     )
-    sides = (region[2] / scale, region[3] / scale, max(filmed.height or 0.0, largest))
+    sides = [region[2] / scale, region[3] / scale]
     if known:
         assert filmed.sides is not None
-        sides = (*filmed.sides, sides[2])
-    notices = [scale_notice, *_guesses(filmed, largest)]
+        sides = [*filmed.sides]
+    if filmed.height is not None:
+        sides.append(max(filmed.height, largest))
+    notices = [scale_notice, *_guesses(filmed)]
     return DescribedTray(
         text=_text(filmed, section, sides),
         notices=tuple(notice for notice in notices if notice),
@@ -147,18 +150,17 @@ def _check_beads(species: Sequence[FilmedBeads], region: tuple[int, int, int, in
             )
 
 
-def _guesses(filmed: FilmedTray, largest: float) -> list[str]:
+def _guesses(filmed: FilmedTray) -> list[str]:
     """What is assumed beside the scale, a line each."""
     notices = []
     if filmed.sides is not None and not filmed.corners_px:
         notices.append('the sides of the container are of no use without --corners')
     if filmed.height is None:
-        size = f', {_MM * largest:.3g} mm' if _is_scale_known(filmed) else ''
         remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm and --diameter-mm'
         notices.append(
-            f'the height of the container is not told; one layer of beads is assumed{size}; in a '
-            'higher one collisions are tilted, and the restitution of the beads reads low or '
-            f'stays unknown: tell {remedy}'
+            'the height of the container is not told; how far collisions are tilted out of the '
+            f'picture follows from the distances of the beads at them; tell it by {remedy}, the '
+            'diameter for one layer'
         )
     if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
         notices.append(
@@ -260,7 +262,7 @@ def _names(species: Sequence[FilmedBeads]) -> list[str]:
     return names
 
 
-def _text(filmed: FilmedTray, section: FilmSection, sides: tuple[float, float, float]) -> str:
+def _text(filmed: FilmedTray, section: FilmSection, sides: Sequence[float]) -> str:
     """The trays file."""
     materials, species = [], []
     for name, beads in zip(_names(filmed.beads), filmed.beads, strict=True):

@@ -14,7 +14,9 @@ from nanorocks_ros.errors import NanorocksError, RecordingError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
+from nanorocks_ros.pipeline.contact_words import contact_lines, length_unit, motion_line
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
+from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.tracks_files import write_tracks
 from nanorocks_ros.studies.analysis.tray_words import tray_lines
@@ -23,9 +25,7 @@ from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
 from nanorocks_ros.studies.measure.measure_report import write_measure_report
 from nanorocks_ros.studies.measure.measured_folder import TRACKS, prepare_folder, write_measured
 from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ, DECAY_PREFIX, MeasuredTray
-from nanorocks_ros.studies.measure.measured_words import LengthUnit, contact_lines, motion_line
 from nanorocks_ros.studies.measure.track_archive import save_tracks, saved_tracks, tracking_key
-from nanorocks_ros.studies.measure.track_contacts import track_contacts
 from nanorocks_ros.studies.measure.track_speeds import track_speeds
 
 if TYPE_CHECKING:
@@ -152,16 +152,9 @@ def _pictures(plan: MeasurePlan, tracked: TrackedBag) -> list[NDArray[np.uint8]]
         overlay(image, tracked.tracks[number], scale, magnification=_MAGNIFICATION)
         for number, image in sorted(tracked.pictures.items())
     ]
-    if _length_unit(plan).name == 'px':
+    if length_unit(film_section(plan.settings.trays_file)).name == 'px':
         return pictures
     return [with_scale_bar(picture, _MAGNIFICATION * scale) for picture in pictures]
-
-
-def _length_unit(plan: MeasurePlan) -> LengthUnit:
-    film = film_section(plan.settings.trays_file)
-    if film is not None and not film.scale_known:
-        return LengthUnit('px', film.pixels_per_metre)
-    return LengthUnit()
 
 
 def _measured_tray(
@@ -172,7 +165,7 @@ def _measured_tray(
     film = film_section(plan.settings.trays_file)
     height_known = not math.isnan(tray.dimensions[2])
     known = height_known and (film is None or film.container_known)
-    unit = _length_unit(plan)
+    unit = length_unit(film_section(plan.settings.trays_file))
     recognition = [
         plan.name_files(line) for verdict in tracked.verdicts[number] for line in verdict.lines()
     ]
@@ -183,7 +176,8 @@ def _measured_tray(
         contacts = track_contacts(
             records, tray, plan.settings, container_known=known, progress=progress
         )
-    lines = [motion_line(speeds, contacts, unit), *contact_lines(contacts, unit)]
+    motion = motion_line(speeds.ends, contacts, unit, speeds.highest)
+    lines = [motion, *contact_lines(contacts, unit)]
     for line in lines:
         teller.say(line)
     step = DecayStep(

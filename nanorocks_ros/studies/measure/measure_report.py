@@ -16,6 +16,7 @@ from nanorocks_ros.outputs.html_report import (
     write_report,
 )
 from nanorocks_ros.outputs.safe_text import counted
+from nanorocks_ros.pipeline.contact_words import restitution_text, restitutions
 from nanorocks_ros.studies.analysis.published_cycles import published_cycles, published_text
 from nanorocks_ros.studies.measure.measure_figure import measure_figure
 from nanorocks_ros.studies.measure.measure_tables import (
@@ -25,7 +26,6 @@ from nanorocks_ros.studies.measure.measure_tables import (
     tray_tables,
 )
 from nanorocks_ros.studies.measure.measured_tray import DECAY_PREFIX
-from nanorocks_ros.studies.measure.measured_words import restitution_text, restitutions
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.studies.measure.measured_words import restitutions
+from nanorocks_ros.pipeline.contact_words import restitutions
 
 if TYPE_CHECKING:
     from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
-    from nanorocks_ros.studies.measure.measured_words import LengthUnit
-    from nanorocks_ros.studies.measure.track_contacts import TrackContacts
+    from nanorocks_ros.pipeline.contact_words import LengthUnit
+    from nanorocks_ros.stages.contact_restitution.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
 
 DECAY_PREFIX = 'decay: '

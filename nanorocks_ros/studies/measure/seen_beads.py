@@ -1,4 +1,4 @@
-"""The beads that some frames of a film show: size where it is not told, number, a picture."""
+"""The beads that some frames of a film show: number, colour, a picture."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
-from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,27 +43,6 @@ class SeenBeads(NamedTuple):
     steady: tuple[float, ...]
     picture: NDArray[np.uint8]
     discs: tuple[tuple[NDArray[np.float64], ...], ...]
-
-
-def guessed_diameter(frames: Sequence[NDArray[np.uint8]]) -> float:
-    """Diameter of the discs that the film shows, [px].
-
-    Raises
-    ------
-    ConfigurationError
-        When no discs of one size stand out.
-    """
-    model = SceneModel(frames, BeadLook())
-    radii = []
-    for frame in frames:
-        candidates = model.candidates(np.ascontiguousarray(frame))
-        radii.append(candidates.outlines.discs[model.alike(candidates), 2])
-    all_radii = np.concatenate(radii)
-    if not all_radii.size:
-        raise ConfigurationError(
-            '--diameter-px', 'cannot be guessed: no discs of one size stand out', 'measure a bead'
-        )
-    return 2.0 * float(np.median(all_radii))
 
 
 def colour_at(frame: NDArray[np.uint8], place: tuple[float, float], diameter: float) -> str:

@@ -6,29 +6,36 @@ Tested by ``test/cli/films/test_film_options.py``.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.appearance import AUTO
-from nanorocks_ros.studies.measure.film_samples import film_samples
+from nanorocks_ros.experiment.film_section import film_section
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.studies.measure.film_samples import FilmSamples, film_samples
 from nanorocks_ros.studies.measure.film_tray import (
     DescribedTray,
     FilmedBeads,
     FilmedTray,
     described_tray,
 )
+from nanorocks_ros.studies.measure.found_diameters import guessed_diameter
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 _MM = 1e-3
+# Of beads whose size is not known yet.
+_NOMINAL_PX = 1.0
 
 
 class ToldFilm(Protocol):
     """What is told of a film; lists have a value for each species, None: not told."""
 
-    diameter_px: Sequence[float] | None
+    diameter_px: Sequence[float | str] | None
     diameter_mm: Sequence[float] | None
     count: Sequence[int] | None
     look: Sequence[str] | None
@@ -45,6 +52,8 @@ def described_film(
 ) -> DescribedTray | None:
     """The trays file that is told in the place of one; None without a diameter in pixels.
 
+    A diameter that is ``auto`` is found in the film.
+
     Raises
     ------
     ConfigurationError
@@ -59,7 +68,43 @@ def described_film(
         raise ConfigurationError(
             '--diameter-px', 'and --trays-file both describe the beads', 'leave out one of them'
         )
-    return described_tray(filmed, film_samples(bag, image_topic).size)
+    if not any(math.isnan(beads.diameter_px) for beads in filmed.beads):
+        return described_tray(filmed, film_samples(bag, image_topic).size)
+    samples = film_samples(bag, image_topic, whole=True)
+    sized, notice = sized_beads(filmed, samples)
+    described = described_tray(sized, samples.size)
+    return replace(described, notices=(notice, *described.notices))
+
+
+def sized_beads(filmed: FilmedTray, samples: FilmSamples) -> tuple[FilmedTray, str]:
+    """The beads with the diameter that the film shows, where none is told, and a notice.
+
+    Raises
+    ------
+    ConfigurationError
+        When no discs of one size stand out, or there are several species.
+    """
+    if len(filmed.beads) > 1:
+        raise ConfigurationError(
+            '--diameter-px',
+            f'{AUTO} finds the size of one species',
+            'measure a bead of each, or mark them: nanorocks tray FILM --browse -o mine.yaml',
+        )
+    # Of any size, for the region and the look.
+    text = described_tray(_of_size(filmed, _NOMINAL_PX), samples.size).text
+    section, appearance = film_section(text), load_trays(text)[1].species[0].appearance
+    assert section is not None
+    assert appearance is not None
+    column, row, width, height = section.region_px
+    crops = [frame[row : row + height, column : column + width] for frame in samples.frames]
+    found = guessed_diameter(crops, BeadLook(sign=appearance.sign, colour=appearance.colour))
+    return _of_size(filmed, round(found.diameter, 2)), (
+        f'the diameter is guessed: {found}; --diameter-px sets it'
+    )
+
+
+def _of_size(filmed: FilmedTray, diameter_px: float) -> FilmedTray:
+    return replace(filmed, beads=(replace(filmed.beads[0], diameter_px=diameter_px),))
 
 
 def filmed_tray(told: ToldFilm) -> FilmedTray | None:
@@ -87,9 +132,9 @@ def _beads(told: ToldFilm, k: int) -> FilmedBeads:
     def value(values: Sequence[Any] | None) -> Any:
         return None if values is None else values[k]
 
-    diameter = value(told.diameter_mm)
+    size, diameter = value(told.diameter_px), value(told.diameter_mm)
     return FilmedBeads(
-        diameter_px=value(told.diameter_px),
+        diameter_px=math.nan if size == AUTO else size,
         diameter=None if diameter is None else _MM * diameter,
         count=value(told.count),
         density=value(told.density_g_cm3),
@@ -101,7 +146,6 @@ def _beads(told: ToldFilm, k: int) -> FilmedBeads:
 
 def _check(told: ToldFilm) -> None:
     lists: dict[str, Sequence[Any] | None] = {
-        '--diameter-px': told.diameter_px,
         '--diameter-mm': told.diameter_mm,
         '--count': told.count,
         '--density-g-cm3': told.density_g_cm3,
@@ -112,18 +156,16 @@ def _check(told: ToldFilm) -> None:
         '--material': told.material,
     }
     single = [] if told.height_mm is None else [told.height_mm]
-    positive = {**lists, '--sides-mm': told.sides_mm, '--height-mm': single}
-    for flag, values in positive.items():
-        for value in values or []:
-            if not (math.isfinite(value) and value > 0):
-                raise ConfigurationError(flag, f'{value:g}', 'give numbers above 0')
+    _check_positive({**lists, '--sides-mm': told.sides_mm, '--height-mm': single}, told)
     given = {flag: values for flag, values in (lists | words).items() if values is not None}
     others = {'--corners': told.corners, '--sides-mm': told.sides_mm, '--height-mm': single}
     if not told.diameter_px:
         for flag, values in {**given, **others}.items():
             if values:
                 raise ConfigurationError(
-                    flag, 'needs --diameter-px', 'add the diameter of a bead in the picture'
+                    flag,
+                    'needs --diameter-px',
+                    f'add the diameter of a bead in the picture, or {AUTO} to find it',
                 )
     for flag, values in given.items():
         if told.diameter_px and len(values) != len(told.diameter_px):
@@ -136,3 +178,12 @@ def _check(told: ToldFilm) -> None:
         raise ConfigurationError(
             '--corners', f'{len(told.corners)} numbers', 'give two corners or four: X Y X Y'
         )
+
+
+def _check_positive(lists: Mapping[str, Sequence[Any] | None], told: ToldFilm) -> None:
+    sizes = [size for size in told.diameter_px or () if size != AUTO]
+    for flag, values in {'--diameter-px': sizes, **lists}.items():
+        for value in values or []:
+            if isinstance(value, str) or not (math.isfinite(value) and value > 0):
+                shown = value if isinstance(value, str) else f'{value:g}'
+                raise ConfigurationError(flag, shown, 'give numbers above 0')

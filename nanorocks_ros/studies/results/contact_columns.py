@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.records import NS, PairCollision, Rebound
+from nanorocks_ros.records import NS, WALL_NAMES, PairCollision, Rebound
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
-
-WALL_NAMES = 'left', 'right', 'top', 'bottom'
-"""Of the walls 0 to 3, as they lie in the picture."""
 
 CONTACT_COLUMNS = (
     Column(name='tray', kind='int64', unit='1', doc='number of the tray'),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from nanorocks_ros.cli.main import build_parser
@@ -24,6 +26,12 @@ def test_options_describe_species_and_container():
     assert filmed.sides == pytest.approx((0.09, 0.06))
     assert filmed.height == pytest.approx(4e-3)
     assert parsed() is None
+
+
+def test_a_diameter_may_be_left_to_the_film():
+    filmed = parsed('--diameter-px', 'auto', '--count', '7')
+    assert math.isnan(filmed.beads[0].diameter_px)
+    assert filmed.beads[0].count == 7
 
 
 @pytest.mark.parametrize(

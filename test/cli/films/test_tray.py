@@ -59,6 +59,21 @@ def test_options_are_written_as_told_and_the_picture_shows_it(film, tmp_path, ca
     assert cv2.imread(str(picture)).shape == (height, width, 3)
 
 
+def test_a_number_that_few_frames_show_is_left_open(tmp_path, capsys):
+    folder, output = tmp_path / 'discs', tmp_path / 'mine.yaml'
+    folder.mkdir()
+    for number, frame in enumerate(disc_frames([DARK], count=12)):
+        # A lid covers one more of them every other frame.
+        frame[: 70 * (number % 4 > 1), : 70 * (1 + number % 4)] = 170
+        cv2.imwrite(str(folder / f'{number:02d}.png'), frame)
+    bag = tmp_path / 'bag'
+    assert main(['import', str(folder), '--rate', '30', '-o', str(bag)]) == 0
+    assert main(['tray', str(bag), '-o', str(output)]) == 0
+    printed = capsys.readouterr()
+    assert 'the number of beads is left open' in printed.err
+    assert load_trays(output)[1].species[0].expected is None
+
+
 def test_an_existing_file_is_not_overwritten(film, tmp_path, capsys):
     output = tmp_path / 'mine.yaml'
     output.write_text('mine')

@@ -145,6 +145,25 @@ def test_the_corners_are_clicked_and_forgotten(look, browsed):
     assert float(page.locator('#bottom').input_value()) == SIZE[1]
 
 
+def test_corners_in_perspective_are_refused_in_words_until_the_box_is_taken(look, browsed):
+    _, url, _ = browsed
+    page = look(url)
+    state_is(page, 'recognised')
+    page.locator('#click-corners').click()
+    box = page.locator('#picture').bounding_box()
+    scale = box['width'] / SIZE[0]
+    for x, y in ((50, 15), (310, 16), (352, 230), (11, 229)):
+        page.mouse.click(box['x'] + scale * x, box['y'] + scale * y)
+    state_is(page, 'not usable as told')
+    words = page.locator('#error').inner_text()
+    assert '--corners: form no upright rectangle: one is 42 px off' in words
+    assert 'calibrate' in words
+    assert page.locator('#save').is_disabled()
+    drag(page, (11, 230), (12, 228))
+    state_is(page, 'recognised')
+    assert page.locator('#save').is_enabled()
+
+
 @pytest.mark.parametrize('name', SIZES)
 def test_nothing_sticks_out_at_any_size(look, browsed, name):
     width, height = SIZES[name]

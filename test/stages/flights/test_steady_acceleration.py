@@ -53,3 +53,25 @@ def test_too_few_places_tell_nothing():
     result = steady_acceleration(tracks_of(thrown((0.0, 0.02))[:8], jitter=NOISE))
     assert math.isnan(result.size)
     assert result.correction == (0.0, 0.0)
+
+
+@pytest.mark.parametrize('acceleration', [(0.0, 0.4), (0.28, 0.28)])
+def test_balls_that_roll_for_most_of_the_film_do_not_hide_the_fall_of_others(acceleration):
+    falling = thrown(acceleration)
+    along = np.array([acceleration[1], -acceleration[0]]) / np.hypot(*acceleration)
+    speeds = np.linspace(0.005, 0.03, 6)
+    rolling = 0.02 + TIME[:, None, None] * speeds[:, None] * along
+    both = np.concatenate([falling, rolling], axis=1)
+    result = steady_acceleration(tracks_of(both, jitter=NOISE))
+    assert result.value == pytest.approx(acceleration, abs=5.0 * result.error)
+    assert result.is_seen
+    steady = steady_acceleration(tracks_of(rolling, jitter=NOISE))
+    assert not steady.is_seen
+
+
+def test_few_bent_paths_among_many_straight_ones_are_no_gravity():
+    bent = thrown((0.0, 0.4))
+    rng = np.random.default_rng(8)
+    straight = 0.02 + TIME[:, None, None] * rng.normal(0.0, 0.02, (30, 2))
+    both = np.concatenate([bent[:, :1], straight], axis=1)
+    assert not steady_acceleration(tracks_of(both, jitter=NOISE)).is_seen

@@ -1,27 +1,15 @@
-"""Beads in some frames: size, colour and number."""
+"""Beads in some frames: colour and number."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from drawn_discs import SIZE, disc_frames
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.studies.measure.film_tray import FilmedBeads, FilmedTray, described_tray
-from nanorocks_ros.studies.measure.seen_beads import colour_at, guessed_diameter, seen_beads
+from nanorocks_ros.studies.measure.seen_beads import colour_at, seen_beads
 
-DARK, BRIGHT, RED = (40, 40, 40), (250, 250, 250), (30, 30, 190)
-
-
-@pytest.mark.parametrize('colour', [DARK, BRIGHT, RED])
-def test_the_diameter_of_discs_of_any_look_is_guessed(colour):
-    assert guessed_diameter(disc_frames([colour])) == pytest.approx(20.0, rel=0.06)
-
-
-def test_an_empty_film_is_refused():
-    noise = np.random.default_rng(1).integers(160, 170, (6, 60, 80, 3), dtype=np.uint8)
-    with pytest.raises(ConfigurationError, match='--diameter-px'):
-        guessed_diameter(list(noise))
+DARK, RED = (40, 40, 40), (30, 30, 190)
 
 
 def test_beads_are_counted_by_species_and_drawn():

@@ -10,13 +10,14 @@ import pytest
 from bead_paths import PIXEL, RATE, tracks_of
 
 from benchmarks.accelerated_tray import AcceleratedTray
+from benchmarks.short_films import CASES, flat_tracks, high_tracks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
 from nanorocks_ros.simulation.shaken_tray import after_shaking
-from nanorocks_ros.studies.measure.track_contacts import track_contacts
+from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 
 TRAY = load_trays()[1]
 SETTINGS = PipelineSettings()
@@ -140,3 +141,28 @@ def test_empty_tracks_are_no_error():
     result = track_contacts([], TRAY, SETTINGS, container_known=False)
     assert result.contacts == ()
     assert result.frames == 0
+
+
+@pytest.fixture(scope='module')
+def high_gas():
+    """Tracks of gases of tray 1, which is half a bead higher than its beads, and of flat discs."""
+    high = [high_tracks(10.0, seed, 0.1) for seed in range(200, 206)]
+    case = CASES[1]
+    return high, [flat_tracks(case, seed) for seed in range(200, 206)]
+
+
+@pytest.mark.parametrize('told', [0.97, 1.0, 1.03])
+def test_the_tilt_of_collisions_follows_from_their_distances_whatever_the_diameter(high_gas, told):
+    for films, side in zip(high_gas, (2.0, 3.0), strict=True):
+        tray = load_trays(
+            f'trays:\n  1:\n    dimensions_mm: [60, 60]\n    species:\n'
+            f'      - {{diameter_mm: {told * side}, look: auto}}\n'
+        )[1]
+        beads = [
+            track_contacts(film, tray, SETTINGS, container_known=False).alone.beads.restitution
+            for film in films
+        ]
+        off = np.array([value.value - 0.85 for value in beads])
+        errors = np.array([value.error for value in beads])
+        assert abs(off.mean()) < 2.0 * errors.mean() / math.sqrt(off.size)
+        assert np.abs(off / errors).max() < 2.5

@@ -1,4 +1,4 @@
-"""What was measured of a film, in words: a line for each result, or the reason why there is none.
+"""What contacts say, in words: a line for each result, or the reason why there is none.
 
 Tested by ``test/studies/measure/test_measure_film.py``.
 """
@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.outputs.html_report import number, with_interval
 from nanorocks_ros.outputs.safe_text import counted
-from nanorocks_ros.studies.results.contact_columns import WALL_NAMES
+from nanorocks_ros.records import WALL_NAMES
 
 if TYPE_CHECKING:
+    from nanorocks_ros.experiment.film_section import FilmSection
     from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
-    from nanorocks_ros.studies.measure.track_contacts import TrackContacts
-    from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds
+    from nanorocks_ros.stages.contact_restitution.track_contacts import TrackContacts
 
 _STANDARD_GRAVITY = 9.80665
 # Ratio to the speeds at the ends of the film above which the highest is told.
@@ -35,13 +35,35 @@ class LengthUnit(NamedTuple):
     per_metre: float = 1e3
 
 
-def motion_line(speeds: TrackSpeeds, contacts: TrackContacts, unit: LengthUnit) -> str:
-    """How the beads move: speeds, and the acceleration that they share."""
-    first, last = (number(speed, 3, unit.per_metre) for speed in speeds.ends)
+def length_unit(film: FilmSection | None) -> LengthUnit:
+    """Millimetres, or pixels where no length is known."""
+    if film is not None and not film.scale_known:
+        return LengthUnit('px', film.pixels_per_metre)
+    return LengthUnit()
+
+
+def motion_line(
+    ends: tuple[float, float],
+    contacts: TrackContacts,
+    unit: LengthUnit,
+    highest: float = math.nan,
+) -> str:
+    """How the beads move: speeds at first and last, and the acceleration that they share.
+
+    Parameters
+    ----------
+    ends : tuple of 2 floats, [m/s]
+        Mean speeds at the ends of the film.
+    contacts : TrackContacts
+    unit : LengthUnit
+    highest : float, [m/s]
+        The highest mean speed; NaN where it is not known.
+    """
+    first, last = (number(speed, 3, unit.per_metre) for speed in ends)
     text = f'mean speed {first} {unit.name}/s at first, {last} {unit.name}/s at last'
     # As of a tray that is shaken some time after the film begins.
-    if speeds.highest > _MUCH_HIGHER * max(speeds.ends):
-        text += f', at most {number(speeds.highest, 3, unit.per_metre)} {unit.name}/s'
+    if highest > _MUCH_HIGHER * max(ends):
+        text += f', at most {number(highest, 3, unit.per_metre)} {unit.name}/s'
     acceleration = contacts.acceleration
     if not acceleration.pieces:
         return f'{text}; flights are too short to show an acceleration'

@@ -1,0 +1,215 @@
+"""Diameters of beads that nobody told, from the discs that a film shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.experiment.calibration_file import calibrated
+from nanorocks_ros.experiment.recorded_experiment import recorded_settings
+from nanorocks_ros.experiment.trays import MILLIMETRE, load_trays
+from nanorocks_ros.experiment.unknown_diameters import (
+    DIAMETER,
+    UnknownDiameter,
+    unknown_diameters,
+    with_diameters,
+)
+from nanorocks_ros.experiment.yaml_lines import is_content
+from nanorocks_ros.outputs.safe_text import counted
+from nanorocks_ros.recordings.bag.bag_folder import read_metadata
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
+from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel
+from nanorocks_ros.studies.analysis.scene_frames import scene_frames
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import PipelineSettings
+
+# Discs of one size differ by less than this part, as half of the middle 68 %.
+_MAX_SPREAD = 0.2
+_LEAST_DISCS = 4
+# Beads that stand for those of unknown size until they are seen, and the most that are.
+_NOMINAL_MM = 1e-3
+_ANY_NUMBER = 2000
+_REMEDY = (
+    f'measure a bead and write {DIAMETER}, or mark it: nanorocks tray FILM --browse -o mine.yaml'
+)
+
+
+class FoundDiameter(NamedTuple):
+    """Diameter of the discs that a film shows.
+
+    Parameters
+    ----------
+    diameter : float, [px]
+        Their median.
+    spread : float
+        Half of the range of the middle 68 %, over it.
+    discs, frames : int
+        So many discs in so many frames.
+    """
+
+    diameter: float
+    spread: float
+    discs: int
+    frames: int
+
+    def __str__(self) -> str:
+        return (
+            f'{self.diameter:.1f} px +- {100.0 * self.spread:.0f} %, the median of '
+            f'{counted(self.discs, "disc")} in {counted(self.frames, "frame")}'
+        )
+
+
+class FoundTrays(NamedTuple):
+    """Settings whose trays file tells all diameters, and what was found, a line each."""
+
+    settings: PipelineSettings
+    notices: tuple[str, ...] = ()
+
+
+def guessed_diameter(
+    frames: Sequence[NDArray[np.uint8]], look: BeadLook | None = None
+) -> FoundDiameter:
+    """Diameter of the discs that the film shows.
+
+    Parameters
+    ----------
+    frames : sequence of ndarray of uint8, (rows, columns, 3), bgr
+    look : BeadLook, optional
+        What is told of them.
+
+    Raises
+    ------
+    ConfigurationError
+        When no discs of one size stand out.
+    """
+    model = SceneModel(frames, look or BeadLook())
+    radii = []
+    for frame in frames:
+        candidates = model.candidates(np.ascontiguousarray(frame))
+        radii.append(candidates.outlines.discs[model.alike(candidates), 2])
+    found = _of_radii(radii)
+    if isinstance(found, str):
+        raise ConfigurationError('--diameter-px', f'cannot be guessed: {found}', 'measure a bead')
+    return found
+
+
+def with_found_diameters(
+    settings: PipelineSettings, told: Collection[str], bag: Path, image_topic: str = ''
+) -> FoundTrays:
+    """Find the diameters that the trays file of the settings leaves open, in the film.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    told : collection of str
+        Names of the settings that the user told, as of `recorded_settings`.
+    bag : Path
+        Of the film.
+    image_topic : str, optional
+        The camera's topic if it has another name than the graph's.
+
+    Raises
+    ------
+    ConfigurationError
+        When a diameter cannot be found, or the settings not be used.
+    RecordingError
+        When the bag cannot be read.
+    """
+    file = settings.trays_file
+    unknown = unknown_diameters(file)
+    if not unknown:
+        return FoundTrays(settings)
+    name = 'trays file' if is_content(file) else file
+    film = _with_nominal_beads(settings, unknown, told, bag, image_topic)
+    diameters, notices = {}, []
+    for key in unknown:
+        found = _of_species(film, key, name)
+        diameters[key] = found.diameter / film.scale / MILLIMETRE
+        material = film.trays[key.tray].species[key.species].material
+        notices.append(
+            f'{name}: the diameter of {material} in tray {key.tray} is found in the film: '
+            f'{diameters[key]:.4g} mm, from {found}; {DIAMETER}: {diameters[key]:.4g} keeps it'
+        )
+    text = with_diameters(file, diameters)
+    return FoundTrays(replace(settings, trays_file=text), tuple(notices))
+
+
+class _Film(NamedTuple):
+    """Trays whose beads have any size, [px/m], and frames by tray."""
+
+    trays: dict[int, Tray]
+    scale: float
+    frames: Mapping[int, Sequence[NDArray[np.uint8]]]
+
+
+def _with_nominal_beads(
+    settings: PipelineSettings,
+    unknown: Sequence[UnknownDiameter],
+    told: Collection[str],
+    bag: Path,
+    image_topic: str,
+) -> _Film:
+    text = with_diameters(settings.trays_file, dict.fromkeys(unknown, _NOMINAL_MM))
+    nominal = replace(settings, trays_file=text)
+    recorded = calibrated(recorded_settings(nominal, told, read_metadata(bag), str(bag)).settings)
+    frames = scene_frames(bag, recorded, image_topic=image_topic)
+    return _Film(load_trays(text), recorded.preprocess.pixels_per_metre, frames)
+
+
+def _of_species(film: _Film, key: UnknownDiameter, name: str) -> FoundDiameter:
+    """The diameter of the discs that look like beads of a species."""
+    tray = film.trays[key.tray]
+    species = tray.species[key.species]
+    where = f'{name}: {species.material} in tray {key.tray}'
+    _check_can_be_found(film, tray, key, where)
+    of_any_size = replace(
+        species, diameter_low=math.nan, diameter_high=math.nan, count=_ANY_NUMBER
+    )
+    detector = SceneDetector(replace(tray, species=(of_any_size,)), film.scale)
+    frames = film.frames[key.tray]
+    detector.learn(frames)
+    found = _of_radii([detector.detect(frame)[0].radii for frame in frames])
+    if isinstance(found, str):
+        raise ConfigurationError(where, f'its diameter cannot be found: {found}', _REMEDY)
+    return found
+
+
+def _check_can_be_found(film: _Film, tray: Tray, key: UnknownDiameter, where: str) -> None:
+    """Refuse beads that the film does not show, and several species."""
+    if tray.species[key.species].appearance is None:
+        raise ConfigurationError(
+            where, f'lacks {DIAMETER}', 'add it, or "look: auto" to have it found in the film'
+        )
+    if key.tray not in film.frames:
+        raise ConfigurationError(
+            where, f'lacks {DIAMETER}, and the film does not show this tray', 'add it'
+        )
+    if len(tray.species) > 1:
+        # Edges tell sizes, but not of which species.
+        raise ConfigurationError(
+            where, 'its diameter cannot be found beside that of another species', _REMEDY
+        )
+
+
+def _of_radii(radii: Sequence[NDArray[np.float64]]) -> FoundDiameter | str:
+    """The diameter by the radii in each frame, [px]; or why there is none."""
+    every = np.concatenate(radii)
+    if every.size < _LEAST_DISCS:
+        return f'{counted(every.size, "disc")} in {counted(len(radii), "frame")}'
+    low, middle, high = (2.0 * value for value in np.quantile(every, [0.16, 0.5, 0.84]).tolist())
+    spread = 0.5 * (high - low) / middle
+    if spread > _MAX_SPREAD:
+        return f'no discs of one size stand out ({low:.0f} to {high:.0f} px)'
+    return FoundDiameter(middle, spread, every.size, len(radii))
