@@ -182,6 +182,8 @@ def add_places(
     errors : ndarray (n,), [px]
         Stated errors of a coordinate.
     """
+    n_due = np.zeros(paths.lengths.size, dtype=np.int64)
+    due = np.empty((paths.lengths.size, _KEPT))
     for k in range(ids.size):
         slot = ids[k] % _SLOTS
         if paths.tracks[slot] != ids[k]:
@@ -197,8 +199,12 @@ def add_places(
                 paths.squares[c, count % _KEPT] = square
                 paths.counts[c] = count + 1
                 if count + 1 >= _FEWEST and (count + 1) % _EVERY == 0:
-                    kept = paths.squares[c, : min(count + 1, _KEPT)]
-                    paths.variances[c] = straight_variance(kept)
+                    n_due[c] = min(count + 1, _KEPT)
+                    due[c, : n_due[c]] = paths.squares[c, : n_due[c]]
+    # In a frame with many beads several fits are due: the last one counts.
+    for c in range(paths.lengths.size):
+        if n_due[c]:
+            paths.variances[c] = straight_variance(due[c, : n_due[c]])
 
 
 @inlined
