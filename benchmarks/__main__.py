@@ -18,6 +18,7 @@ ALL = (
     'cold_start',
     'offline',
     'offline_profile',
+    'compiled_calls',
     'batch',
     'live',
     'live_plate',

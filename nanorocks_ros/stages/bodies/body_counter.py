@@ -53,7 +53,7 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
     """Counts the bodies of one tray.
 
     Tracks give the new merges and the estimates that are due. A new cycle starts with single
-    beads.
+    beads. Nothing is counted in a tray with grains.
 
     Parameters
     ----------
@@ -111,6 +111,8 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
 
     def _process(self, record: Tracks) -> tuple[BodyEstimate | Merge, ...]:
         """Add the tracks of a frame; return new merges and the estimates that are due."""
+        if self._has_grains:
+            return ()
         estimates: tuple[BodyEstimate | Merge, ...] = ()
         if record.cycle != self._cycle:
             estimates = self.flush()
@@ -182,11 +184,8 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
     def _tracks_break_often(self) -> bool:
         """Whether tracks end too often for bonds to be found.
 
-        After the first merge the answer is no: tracks then end since beads occlude each other. Of
-        grains it is always yes.
+        After the first merge the answer is no: tracks then end since beads occlude each other.
         """
-        if self._has_grains:
-            return True
         if self._first_merge is not None:
             return False
         time = self._frames.last.time if self._frames else 0.0

@@ -87,10 +87,10 @@ class TurningPoints:
 
     def __init__(self, radius: float) -> None:
         self._radius = radius
-        # Row of each bead in the state, in the order in which they were seen first.
-        self._slots: dict[int, int] = {}
-        self._last_ids = np.empty(0, dtype=np.int32)
-        self._last_slots = np.empty(0, dtype=np.int64)
+        # Row of each bead in the state by its number, in the order in which they were seen first;
+        # -1 before.
+        self._slots = np.full(256, -1)
+        self._beads = 0
         self._state = np.zeros((256, 2, 2))
         self._turns: dict[tuple[int, int], list[tuple[float, float]]] = {
             (axis, high): [] for axis in range(2) for high in range(2)
@@ -120,17 +120,20 @@ class TurningPoints:
             self._outermost[axis, 1].append(high[axis])
 
     def _slots_of(self, ids: NDArray[np.int32]) -> NDArray[np.int64]:
-        """Row of each bead in the state; most frames have the beads of the last one."""
-        if not np.array_equal(ids, self._last_ids):
-            self._last_ids = ids
-            self._last_slots = np.array([self._slot(number) for number in ids.tolist()], np.int64)
-        return self._last_slots
-
-    def _slot(self, number: int) -> int:
-        slot = self._slots.setdefault(number, len(self._slots))
-        if slot >= len(self._state):
+        """Row of each bead in the state."""
+        largest = int(ids.max(initial=0))
+        if largest >= self._slots.size:
+            further = np.full(largest + self._slots.size, -1)
+            self._slots = np.concatenate([self._slots, further])
+        slots = self._slots[ids]
+        if slots.min(initial=0) < 0:
+            new = ids[slots < 0]
+            self._slots[new] = self._beads + np.arange(new.size)
+            self._beads += new.size
+            slots = self._slots[ids]
+        while self._beads > len(self._state):
             self._state = np.concatenate([self._state, np.zeros_like(self._state)])
-        return slot
+        return slots
 
     def width(self, axis: int, expected: float) -> tuple[float, float] | None:
         """Distance of the two walls across an axis, and its error, [m]; None when unknown.

@@ -8,11 +8,13 @@ Tested by ``test/stages/speed/test_skipped_frames.py``.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
@@ -93,16 +95,61 @@ class SkippedFrames:
 def _step_between(earlier: Tracks, later: Tracks) -> _Step | None:
     """The steps of the beads seen in both frames, in space."""
     interval = (later.stamp_ns - earlier.stamp_ns) / NS
-    first, second = np.flatnonzero(earlier.seen), np.flatnonzero(later.seen)
-    ids, old, new = np.intersect1d(
-        earlier.ids[first], later.ids[second], assume_unique=True, return_indices=True
-    )
-    if interval <= 0.0 or ids.size < _FEWEST_BEADS:
+    if interval <= 0.0:
         return None
-    ends = later.positions[second[new]] + later.displacement
-    steps = ends - earlier.positions[first[old]] - earlier.displacement
-    median = float(np.median(np.hypot(*steps.T)))
-    return _Step(ids, steps / interval, median, median / interval)
+    most = min(earlier.ids.size, later.ids.size)
+    ids, steps = np.empty(most, dtype=np.int32), np.empty((most, 2))
+    count, median = _write_steps(
+        earlier.ids,
+        earlier.seen,
+        earlier.positions,
+        earlier.displacement,
+        later.ids,
+        later.seen,
+        later.positions,
+        later.displacement,
+        ids,
+        steps,
+    )
+    if count < _FEWEST_BEADS:
+        return None
+    return _Step(ids[:count], steps[:count] / interval, median, median / interval)
+
+
+@compiled
+def _write_steps(
+    earlier_ids: NDArray[np.int32],
+    earlier_seen: NDArray[np.bool_],
+    earlier_positions: NDArray[np.float64],
+    earlier_displacement: NDArray[np.float64],
+    later_ids: NDArray[np.int32],
+    later_seen: NDArray[np.bool_],
+    later_positions: NDArray[np.float64],
+    later_displacement: NDArray[np.float64],
+    ids: NDArray[np.int32],
+    steps: NDArray[np.float64],
+) -> tuple[int, float]:
+    """Write numbers and steps of the beads seen in both frames; how many, and the median length.
+
+    The numbers ascend in both frames.
+    """
+    lengths = np.empty(ids.size)
+    j = count = 0
+    for k in range(later_ids.size):
+        while j < earlier_ids.size and earlier_ids[j] < later_ids[k]:
+            j += 1
+        if j == earlier_ids.size:
+            break
+        if earlier_ids[j] != later_ids[k] or not (earlier_seen[j] and later_seen[k]):
+            continue
+        ids[count] = later_ids[k]
+        for axis in range(2):
+            end = later_positions[k, axis] + later_displacement[axis]
+            steps[count, axis] = end - earlier_positions[j, axis] - earlier_displacement[axis]
+        lengths[count] = math.hypot(steps[count, 0], steps[count, 1])
+        count += 1
+    median = float(np.median(lengths[:count])) if count else math.nan
+    return count, median
 
 
 def _frames_missing(before: _Step, step: _Step, after: _Step) -> int:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+Positions = tuple['NDArray[np.float64]', ...]
+
 # Beads this much further from each other than their radii touch: a share of that, and [px].
 _GAP_SHARE, _GAP_PX = 0.04, 0.5
 
@@ -31,6 +33,17 @@ class Moment:
     radii: NDArray[np.float64]
     links: NDArray[np.int32]
     displacement: NDArray[np.float64]
+
+
+@compiled
+def links_to(
+    positions: NDArray[np.float64], before: NDArray[np.float64], links: NDArray[np.int32]
+) -> NDArray[np.int32]:
+    """Links of a frame, by the places of its beads, (n, 2), and of those before, (m, 2).
+
+    `links` are those of the frame before; see `links_from`.
+    """
+    return links_from(nearest_rows(positions, before), links)
 
 
 @compiled
@@ -52,22 +65,27 @@ def links_from(before: NDArray[np.int64], links: NDArray[np.int32]) -> NDArray[n
     return longer
 
 
-def paths_of(
-    moments: deque[Moment], lags: tuple[int, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions some frames ago of the beads seen since then, (lags, n, 2), and their radii."""
-    last = moments[-1]
-    positions = tuple(moments[-1 - k].positions for k in lags)
-    return _joined(positions, last.links, lags, last.radii)
+def positions_at(moments: deque[Moment], lags: tuple[int, ...]) -> Positions:
+    """Positions of all beads so many frames ago, one array for each of the lags."""
+    return tuple(moments[-1 - k].positions for k in lags)
 
 
 @compiled
-def _joined(
-    positions: tuple[NDArray[np.float64], ...],
+def paths_of(
+    positions: Positions,
     links: NDArray[np.int32],
     lags: tuple[int, ...],
     radii: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions some frames ago of the beads seen since then, (lags, n, 2), and their radii.
+
+    Parameters
+    ----------
+    positions : tuple of ndarrays (beads, 2)
+        So many frames ago as `lags` say, which ascend.
+    links, radii
+        Of the last frame; see `Moment`.
+    """
     seen = np.flatnonzero(links[lags[-1], :-1] >= 0)
     paths = np.empty((len(lags), seen.size, 2))
     for number in range(len(lags)):
@@ -114,13 +132,12 @@ def column_medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @compiled
-def nearest_rows(
-    positions: NDArray[np.float64], before: NDArray[np.float64], rows: NDArray[np.int64]
-) -> None:
+def nearest_rows(positions: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.int64]:
     """Row of each bead in the frame before: that nearest to it, if it is also nearest to that.
 
     -1 for a bead that has none.
     """
+    rows = np.empty(positions.shape[0], dtype=np.int64)
     taken = np.full(before.shape[0], -1, np.int64)
     nearest = np.full(before.shape[0], np.inf)
     for k in range(positions.shape[0]):
@@ -139,6 +156,7 @@ def nearest_rows(
             taken[j], nearest[j] = k, best
         else:
             rows[k] = -1
+    return rows
 
 
 @compiled

@@ -24,12 +24,13 @@ from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.picture_jitter import JitterMeter
 from nanorocks_ros.stages.tracking.bead_paths import (
     Moment,
+    Positions,
     bend,
     body_bends,
     column_medians,
-    links_from,
-    nearest_rows,
+    links_to,
     paths_of,
+    positions_at,
 )
 from nanorocks_ros.stages.tracking.shared_error import SharedError
 
@@ -134,12 +135,11 @@ class CameraMotion:
             Of a component of the displacement.
         """
         last = self._moments[-1] if self._moments else None
-        rows = np.full(len(positions), -1)
-        step, links = 0.0, np.empty((0, 1), np.int32)
+        step, before, links = 0.0, np.empty((0, 2)), np.empty((0, 1), np.int32)
         if last is not None:
-            nearest_rows(positions, last.positions, rows)
-            step, links = time - last.time, last.links[: len(self._moments)]
-        links = links_from(rows, links)
+            step, before = time - last.time, last.positions
+            links = last.links[: len(self._moments)]
+        links = links_to(positions, before, links)
         self._moments.append(Moment(time, positions, radii, links, displacement))
         while time - self._moments[0].time > 2.0 * _LAGS[-1] + _MEMORY:
             self._moments.popleft()
@@ -193,11 +193,12 @@ class CameraMotion:
         share = min(1.0, step / _MEMORY)
         moved = bend(later.displacement, middle.displacement, earlier.displacement, ratio)
         still = math.hypot(moved[0], moved[1]) < _SIGNIFICANT * _BEND_ERROR * error
-        bends = np.empty((0, 2)) if still else self._bends(frames, ratio)
-        if len(bends) < _FEWEST_BODIES:
+        bodies, of_tray, of_camera = (
+            (0, 0.0, 0.0) if still else self._chi_squares(frames, ratio, moved, error)
+        )
+        if bodies < _FEWEST_BODIES:
             self._misfit += (1.0 - self._misfit) * share
             return _Fate.STILL if still else _Fate.UNKNOWN
-        of_tray, of_camera = _chi_squares(bends, moved, error)
         likelihood = min(max(0.5 * (of_tray - of_camera), -_LARGEST_RATIO), _LARGEST_RATIO)
         # Successive bends share the motion within a lag.
         self._evidence += likelihood / frames
@@ -205,29 +206,53 @@ class CameraMotion:
         self._misfit += (square - self._misfit) * share
         return _Fate.WEIGHED
 
-    def _bends(self, frames: int, ratio: float) -> NDArray[np.float64]:
-        """Bends of the paths of all bodies that are in all frames from the first on, (n, 2)."""
-        paths, radii = paths_of(self._moments, (0, frames, 2 * frames))
-        return body_bends(paths, radii, ratio)
+    def _chi_squares(
+        self, frames: int, ratio: float, moved: NDArray[np.float64], error: float
+    ) -> tuple[int, float, float]:
+        """See `_chi_squares`: of all bodies that are in all frames from the first on."""
+        lags = (0, frames, 2 * frames)
+        last = self._moments[-1]
+        positions = positions_at(self._moments, lags)
+        return _chi_squares(positions, last.links, lags, last.radii, ratio, moved, error)
 
 
 @compiled
 def _chi_squares(
-    bends: NDArray[np.float64], moved: NDArray[np.float64], error: float
-) -> tuple[float, float]:
+    positions: Positions,
+    links: NDArray[np.int32],
+    lags: tuple[int, int, int],
+    radii: NDArray[np.float64],
+    ratio: float,
+    moved: NDArray[np.float64],
+    error: float,
+) -> tuple[int, float, float]:
     """Squares of the common bend that the motions of tray and camera leave, over its variance.
 
     Parameters
     ----------
-    bends : ndarray (bodies, 2), [px]
+    positions, links, lags, radii
+        See `paths_of`.
+    ratio : float
+        See `body_bends`.
     moved : ndarray (2,), [px]
         Bend of the motion of the picture.
     error : float, [px]
         Of a registration.
+
+    Returns
+    -------
+    int
+        Number of bodies; with too few the squares are 0.
+    float, float
+        Of the tray, of the camera.
     """
+    paths, radii_seen = paths_of(positions, links, lags, radii)
+    bends = body_bends(paths, radii_seen, ratio)
+    count = bends.shape[0]
+    if count < _FEWEST_BODIES:
+        return count, 0.0, 0.0
     common = column_medians(bends)
     deviation = column_medians(np.abs(bends - common))
-    count = bends.shape[0]
     scatter = _MEDIAN_ERROR * _DEVIATION * (1.0 + _FEW_BODIES / (count - 1)) / math.sqrt(count)
     # A shift of the tray that was registered wrongly seems to be one of all beads.
     shared = _LEAST_ERROR**2 + (_BEND_ERROR * error) ** 2
@@ -237,4 +262,4 @@ def _chi_squares(
         variance = (scatter * deviation[axis]) ** 2 + shared
         of_tray += (common[axis] + moved[axis]) ** 2 / variance
         of_camera += common[axis] ** 2 / variance
-    return of_tray, of_camera
+    return count, of_tray, of_camera

@@ -19,17 +19,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.bead_distances import BeadDistances, PairDistances
+from nanorocks_ros.stages.tracking.bead_distances import speed_in_window
 from nanorocks_ros.stages.tracking.displacements import (
     ALL_SPECIES,
     MinDisplacement,
     TrackSeries,
-    displacements_beyond_noise,
     join_tracks,
-    pair_displacements,
-    position_noise,
 )
-from nanorocks_ros.stages.tracking.hidden_beads import bead_weights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,6 +54,7 @@ are lost more often, are slower."""
 
 # Smallest number of beads of a mean.
 _MIN_BEADS = 3
+_NO_FLOOR = (math.nan, math.nan)
 NOISE_FRAMES = 10
 """Number of frames from which the noise is measured."""
 
@@ -182,19 +179,9 @@ class _Told(NamedTuple):
 
     def of(self, species: int) -> NDArray[np.int32]:
         """Number of beads of each species; 0 of those that do not count."""
-        if species == ALL_SPECIES:
-            return self.expected
-        return np.where(np.arange(self.expected.size) == species, self.expected, 0).astype(
-            np.int32
-        )
-
-    def weights(
-        self, series: TrackSeries, frame: int, species: int
-    ) -> tuple[NDArray[np.float64], float]:
-        """How many beads each one in a frame stands for, and the hidden share of the beads."""
-        if self.floor is None:
-            return np.ones(series.first[frame + 1] - series.first[frame]), 0.0
-        return bead_weights(series, frame, species, self.of(species), self.floor)
+        # Always another array, which may be written: numba compiles for one kind.
+        counts = (species == ALL_SPECIES) | (np.arange(self.expected.size) == species)
+        return np.where(counts, self.expected, 0).astype(np.int32)
 
 
 def _mean_speed(
@@ -207,45 +194,25 @@ def _mean_speed(
     minimum = MinDisplacement(
         least_distance * least_distance, _MIN_NOISE_RATIO**2, _MIN_ERROR_RATIO**2, _MIN_BEADS
     )
-    lag, distance_rows, *means = displacements_beyond_noise(
-        series, species, position_noise(recent, species), minimum
+    counted = told.of(species)
+    floor = _NO_FLOOR if told.floor is None else told.floor
+    lag, beads, value, error, exceeds_errors, hidden = speed_in_window(
+        series, recent, species, told.expected, counted, floor, minimum
     )
     if not lag:
         return None
-    frames = tuple(series.stamps.size - 1 - k * lag for k in range(3))
-    weights, hidden = told.weights(series, frames[1], species)
-    halves = (
-        _pairs(series, frames[:2], 1, species, told.expected, weights),
-        _pairs(series, frames[1:], 0, species, told.expected, weights),
-    )
-    distances = BeadDistances(halves, *distance_rows, *means)
-    end, middle, first = (int(series.stamps[frame]) for frame in frames)
-    beads = max(int(told.of(species).sum()), 1)
-    share = distances.whole_window.size / beads
-    value, error = distances.speed((end - middle) / _NS, (middle - first) / _NS)
+    last = series.stamps.size - 1
+    end, first = int(series.stamps[last]), int(series.stamps[last - 2 * lag])
+    share = beads / max(int(counted.sum()), 1)
     error = math.hypot(error, told.loss_bias * max(1.0 - share, 0.0) * value)
     return MeanSpeed(
         stamp_ns=(first + end) // 2,
         mean_projected_speed=value,
         mean_projected_speed_error=error,
         window=(end - first) / _NS,
-        beads=distances.whole_window.size,
+        beads=beads,
         share=share,
-        reliable=share >= RELIABLE_SHARE and distances.exceed_errors(),
-        beyond_errors=distances.exceed_errors(),
+        reliable=share >= RELIABLE_SHARE and exceeds_errors,
+        beyond_errors=exceeds_errors,
         hidden=hidden,
     )
-
-
-def _pairs(
-    series: TrackSeries,
-    frames: tuple[int, ...],
-    middle: int,
-    species: int,
-    expected: NDArray[np.int32],
-    weights: NDArray[np.float64],
-) -> PairDistances:
-    """Distances between two frames, of which that with the number `middle` has these weights."""
-    distances, rows = pair_displacements(series, frames[0], frames[1], species)
-    of_pairs = weights[rows[middle] - series.first[frames[middle]]]
-    return PairDistances(distances, series.species[rows[0]], of_pairs, expected)

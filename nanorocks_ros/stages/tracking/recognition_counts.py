@@ -11,10 +11,10 @@ import numpy as np
 
 from nanorocks_ros.records import Quality
 from nanorocks_ros.stages.tracking.recognition_kernels import (
+    COUNTS,
     SUMS_OF_TRACK,
     Discs,
-    add_displacements,
-    add_frame,
+    add_image,
 )
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 _REST_RADII, _REST_ERRORS = 0.25, 8.0
 # A track tells whether its disc moves when it lasts for this part of the film.
 _LONG_SHARE = 0.25
-# Frames of the longer displacements; how many tell, and their squares over those of errors.
+# Frames of the longer displacements, beside those of one frame; how many tell, and their squares
+# over those of errors.
 _LONG_LAG, _LEAST_DISPLACEMENTS, _LEAST_SIGNAL = 4, 100, 4.0
 
 
@@ -104,9 +105,13 @@ class RecognitionCounter:
         self._crowded = crowded
         self._frames = 0
         self._wrong_scale = 0
-        self._species = [
-            _SpeciesCounter(_least_distance(tray, k)) for k in range(len(tray.species))
-        ]
+        count = len(tray.species)
+        self._expected = np.array([species.count for species in tray.species])
+        self._least_distances = np.array([_least_distance(tray, k) for k in range(count)])
+        self._counts = np.zeros((count, COUNTS), dtype=np.int64)
+        self._displacements = np.zeros((count, 2, 3))
+        self._track_sums = np.empty((0, SUMS_OF_TRACK))
+        self._last_images: deque[Discs] = deque(maxlen=_LONG_LAG)
 
     def push(self, tracks: Tracks, max_speed: float) -> None:
         """Count the tracks of an image.
@@ -120,55 +125,7 @@ class RecognitionCounter:
         self._max_speed = max(self._max_speed, max_speed)
         self._frames += 1
         self._wrong_scale += Quality.WRONG_SCALE in tracks.quality
-        for k, (counter, species) in enumerate(
-            zip(self._species, self._tray.species, strict=True)
-        ):
-            counter.push(tracks, k, species.count, max_speed)
-
-    def counts(self) -> tuple[SpeciesCounts, ...]:
-        """What was counted so far, for each species; empty before the first image."""
-        if self._frames == 0:
-            return ()
-        return tuple(self._counts_of(counter, k) for k, counter in enumerate(self._species))
-
-    def _counts_of(self, counter: _SpeciesCounter, k: int) -> SpeciesCounts:
-        species = self._tray.species[k]
-        frames = self._frames
-        return SpeciesCounts(
-            tray=self._tray.number,
-            material=species.material,
-            expected=species.expected,
-            followed=not (self._crowded and counter.tracked == 0),
-            frames=frames,
-            seen=counter.seen / frames,
-            tracked=counter.tracked / frames,
-            complete=counter.complete / frames,
-            tracks=len(counter.tracks),
-            track_length=counter.median_length(),
-            at_rest=counter.share_at_rest(_LONG_SHARE * frames),
-            overlapping=counter.overlapping / max(counter.seen, 1),
-            near_limit=counter.fast / max(counter.speeds, 1),
-            max_speed=self._max_speed,
-            wrong_scale=self._wrong_scale / frames,
-            spread_exponent=counter.spread.exponent,
-            learnt=species.appearance is not None,
-        )
-
-
-class _SpeciesCounter:
-    """Sums over the images for one species."""
-
-    def __init__(self, least_distance: float) -> None:
-        self._least_distance = least_distance
-        self.seen = self.tracked = self.complete = self.overlapping = 0
-        self.fast = self.speeds = 0
-        # By number of the track: images, least and largest place, sums of radius and error.
-        self._sums = np.empty((0, SUMS_OF_TRACK))
-        self.spread = _Spread()
-
-    def push(self, tracks: Tracks, species: int, expected: int, max_speed: float) -> None:
-        """Count the discs of the species with this index in the tracks of an image."""
-        discs = Discs(
+        image = Discs(
             tracks.ids,
             tracks.species,
             tracks.positions,
@@ -177,72 +134,109 @@ class _SpeciesCounter:
             tracks.velocities,
             tracks.seen,
         )
-        # The numbers of the tracks rise.
-        last = int(tracks.ids[-1]) if tracks.ids.size else -1
-        tracked, seen, overlapping, speeds, fast = add_frame(
-            discs, species, self._least_distance, max_speed, self._sums_up_to(last)
+        images = self._last_images
+        earlier = (
+            images[-1] if images else _NO_DISCS,
+            images[0] if len(images) == _LONG_LAG else _NO_DISCS,
         )
-        self.tracked += tracked
-        self.seen += seen
-        self.complete += seen >= expected
-        self.overlapping += overlapping
-        self.speeds += speeds
-        self.fast += fast
-        self.spread.push(discs, species)
+        # The numbers of the tracks rise.
+        self._make_room(int(tracks.ids[-1]) if tracks.ids.size else -1)
+        add_image(
+            image,
+            earlier,
+            self._expected,
+            self._least_distances,
+            max_speed,
+            self._track_sums,
+            self._counts,
+            self._displacements,
+        )
+        images.append(image)
 
-    def _sums_up_to(self, bead: int) -> NDArray[np.float64]:
-        if bead >= len(self._sums):
-            more = np.zeros((bead + 1, SUMS_OF_TRACK))
+    def _make_room(self, track: int) -> None:
+        if track >= len(self._track_sums):
+            more = np.zeros((track + 1, SUMS_OF_TRACK))
             more[:, 1:3], more[:, 3:5] = math.inf, -math.inf
-            self._sums = np.concatenate([self._sums, more])
-        return self._sums
+            self._track_sums = np.concatenate([self._track_sums, more])
 
-    @property
-    def tracks(self) -> NDArray[np.float64]:
-        """The sums of the tracks that were seen."""
-        return self._sums[self._sums[:, 0] > 0.0]
+    def counts(self) -> tuple[SpeciesCounts, ...]:
+        """What was counted so far, for each species; empty before the first image."""
+        if self._frames == 0:
+            return ()
+        return tuple(self._counts_of(k) for k in range(len(self._tray.species)))
 
-    def median_length(self) -> float:
-        """Images in the track of a disc, median over the discs."""
-        lengths = np.sort(self.tracks[:, 0])
-        if lengths.size == 0:
-            return math.nan
-        return float(lengths[np.searchsorted(np.cumsum(lengths), 0.5 * lengths.sum())])
+    def _counts_of(self, k: int) -> SpeciesCounts:
+        species = self._tray.species[k]
+        frames = self._frames
+        tracked, seen, complete, overlapping, speeds, fast = self._counts[k].tolist()
+        is_seen = (self._track_sums[:, 0] > 0.0) & (self._track_sums[:, 7] == k)
+        track_sums = self._track_sums[is_seen]
+        return SpeciesCounts(
+            tray=self._tray.number,
+            material=species.material,
+            expected=species.expected,
+            followed=not (self._crowded and tracked == 0),
+            frames=frames,
+            seen=seen / frames,
+            tracked=tracked / frames,
+            complete=complete / frames,
+            tracks=len(track_sums),
+            track_length=_median_length(track_sums),
+            at_rest=_share_at_rest(track_sums, _LONG_SHARE * frames),
+            overlapping=overlapping / max(seen, 1),
+            near_limit=fast / max(speeds, 1),
+            max_speed=self._max_speed,
+            wrong_scale=self._wrong_scale / frames,
+            spread_exponent=_spread_exponent(self._displacements[k]),
+            learnt=species.appearance is not None,
+        )
 
-    def share_at_rest(self, least_images: float) -> float:
-        """Share of the discs in tracks of at least so many images that never move."""
-        rows = self.tracks[self.tracks[:, 0] >= least_images]
-        if len(rows) == 0:
-            return math.nan
-        images = rows[:, 0]
-        extent = np.hypot(*(rows[:, 3:5] - rows[:, 1:3]).T)
-        rest = np.maximum(_REST_RADII * rows[:, 5], _REST_ERRORS * rows[:, 6]) / images
-        return float(images[extent < rest].sum() / images.sum())
+
+def _no_discs() -> Discs:
+    """An image without discs, of the types of the arrays of `Tracks`, which are read-only."""
+    discs = Discs(
+        np.empty(0, dtype=np.int32),
+        np.empty(0, dtype=np.int32),
+        np.empty((0, 2)),
+        np.empty(0),
+        np.empty(0),
+        np.empty((0, 2)),
+        np.empty(0, dtype=np.bool_),
+    )
+    for array in discs:
+        array.flags.writeable = False
+    return discs
 
 
-class _Spread:
-    """How squared displacements grow from one frame to several."""
+_NO_DISCS = _no_discs()
 
-    def __init__(self) -> None:
-        self._frames: deque[Discs] = deque(maxlen=_LONG_LAG + 1)
-        # By lag: displacements, sum of their squares, and what errors add to it.
-        self._sums = {lag: np.zeros(3) for lag in (1, _LONG_LAG)}
 
-    def push(self, discs: Discs, species: int) -> None:
-        """Add the displacements of the discs of a species up to the next image."""
-        self._frames.append(discs)
-        for lag, sums in self._sums.items():
-            if len(self._frames) > lag:
-                add_displacements(discs, self._frames[-1 - lag], species, sums)
+def _median_length(track_sums: NDArray[np.float64]) -> float:
+    """Images in the track of a disc, median over the discs."""
+    lengths = np.sort(track_sums[:, 0])
+    if lengths.size == 0:
+        return math.nan
+    return float(lengths[np.searchsorted(np.cumsum(lengths), 0.5 * lengths.sum())])
 
-    @property
-    def exponent(self) -> float:
-        """Power of the time; NaN where it is not known."""
-        (short, squares, noise), (long, far, far_noise) = self._sums.values()
-        if min(short, long) < _LEAST_DISPLACEMENTS or squares < _LEAST_SIGNAL * noise:
-            return math.nan
-        ratio = (far - far_noise) / long / ((squares - noise) / short)
-        return math.log(ratio) / math.log(_LONG_LAG) if ratio > 0.0 else math.nan
+
+def _share_at_rest(track_sums: NDArray[np.float64], least_images: float) -> float:
+    """Share of the discs in tracks of at least so many images that never move."""
+    rows = track_sums[track_sums[:, 0] >= least_images]
+    if len(rows) == 0:
+        return math.nan
+    images = rows[:, 0]
+    extent = np.hypot(*(rows[:, 3:5] - rows[:, 1:3]).T)
+    rest = np.maximum(_REST_RADII * rows[:, 5], _REST_ERRORS * rows[:, 6]) / images
+    return float(images[extent < rest].sum() / images.sum())
+
+
+def _spread_exponent(displacements: NDArray[np.float64]) -> float:
+    """Power of the time with which squared displacements grow; NaN where it is not known."""
+    (short, squares, noise), (long, far, far_noise) = displacements.tolist()
+    if min(short, long) < _LEAST_DISPLACEMENTS or squares < _LEAST_SIGNAL * noise:
+        return math.nan
+    ratio = (far - far_noise) / long / ((squares - noise) / short)
+    return math.log(ratio) / math.log(_LONG_LAG) if ratio > 0.0 else math.nan
 
 
 def _least_distance(tray: Tray, index: int) -> float:

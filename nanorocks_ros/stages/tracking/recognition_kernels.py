@@ -13,8 +13,12 @@ from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
 
-SUMS_OF_TRACK = 7
-"""Of a track: images, least and largest place (column, row), sums of radius and of its error."""
+SUMS_OF_TRACK = 8
+"""Of a track: images, least and largest place (column, row), sums of radius and of its error, and
+its species."""
+COUNTS = 6
+"""Of a species: discs tracked, discs seen, images in which all are seen, discs that overlap
+another one more than beads can, known speeds, and those near the largest."""
 
 # Discs of beads that touch are apart by the sum of their radii in space; edges err by some of it.
 _OVERLAP = 0.8
@@ -35,32 +39,54 @@ class Discs(NamedTuple):
 
 
 @compiled
-def add_frame(
-    discs: Discs,
-    species: int,
-    least_distance: float,
+def add_image(
+    image: Discs,
+    earlier: tuple[Discs, Discs],
+    expected: NDArray[np.int64],
+    least_distances: NDArray[np.float64],
     max_speed: float,
-    sums: NDArray[np.float64],
-) -> tuple[int, int, int, int, int]:
-    """Add the discs of a species to the sums of their tracks.
+    track_sums: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    displacements: NDArray[np.float64],
+) -> None:
+    """Add the discs of an image to the sums of their species and tracks.
 
     Parameters
     ----------
-    discs : Discs
-    species : int
-    least_distance : float
+    image : Discs
+    earlier : tuple of 2 Discs
+        Of two images before, without discs where there was none.
+    expected : ndarray of int64, (species,)
+        Beads in the tray.
+    least_distances : ndarray (species,)
         Of two discs of beads that touch, over the sum of their radii.
     max_speed : float, [m/s]
         Largest speed at which beads are linked.
-    sums : ndarray (tracks, SUMS_OF_TRACK)
-        Changed.
-
-    Returns
-    -------
-    tuple of 5 int
-        Discs that are tracked, that are seen, that overlap another one more than beads can; known
-        speeds, and those near the largest.
+    track_sums : ndarray (tracks, SUMS_OF_TRACK)
+        Changed, as the next two.
+    counts : ndarray of int64, (species, COUNTS)
+    displacements : ndarray (species, 2, 3)
+        Since each of the two images: number of displacements, their squares and what errors add
+        to these.
     """
+    for species in range(expected.size):
+        tracked, seen, speeds, fast = _add_discs(image, species, max_speed, track_sums)
+        own = counts[species]
+        own[0] += tracked
+        own[1] += seen
+        own[2] += seen >= expected[species]
+        own[3] += _overlapping(image, species, _OVERLAP * least_distances[species])
+        own[4] += speeds
+        own[5] += fast
+        for lag in range(2):
+            _add_displacements(image, earlier[lag], species, displacements[species, lag])
+
+
+@compiled
+def _add_discs(
+    discs: Discs, species: int, max_speed: float, track_sums: NDArray[np.float64]
+) -> tuple[int, int, int, int]:
+    """Add discs to their tracks; how many are tracked and seen, and have known and high speeds."""
     tracked, seen, speeds, fast = 0, 0, 0, 0
     for k in range(discs.ids.size):
         if discs.species[k] != species:
@@ -71,8 +97,8 @@ def add_frame(
         fast += speed > _NEAR_LIMIT * max_speed
         if discs.seen[k]:
             seen += 1
-            _add_disc(discs, k, sums[discs.ids[k]])
-    return tracked, seen, _overlapping(discs, species, _OVERLAP * least_distance), speeds, fast
+            _add_disc(discs, k, track_sums[discs.ids[k]])
+    return tracked, seen, speeds, fast
 
 
 @compiled
@@ -88,6 +114,7 @@ def _add_disc(discs: Discs, k: int, own: NDArray[np.float64]) -> None:
         own[3 + axis] = max(own[3 + axis], discs.positions[k, axis])
     own[5] += discs.radii[k]
     own[6] += discs.errors[k]
+    own[7] = discs.species[k]
 
 
 @compiled
@@ -120,18 +147,10 @@ def _counts(discs: Discs, k: int, species: int) -> bool:
 
 
 @compiled
-def add_displacements(
+def _add_displacements(
     later: Discs, earlier: Discs, species: int, sums: NDArray[np.float64]
 ) -> None:
-    """Add the displacements of the discs of a species that two images show.
-
-    Parameters
-    ----------
-    later, earlier : Discs
-    species : int
-    sums : ndarray (3,)
-        Number of displacements, their squares and what errors add to these; changed.
-    """
+    """Add the displacements of the discs of a species that two images show to `sums`, (3,)."""
     j = 0
     for k in range(later.ids.size):
         while j < earlier.ids.size and earlier.ids[j] < later.ids[k]:

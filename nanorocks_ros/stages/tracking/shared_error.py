@@ -11,7 +11,12 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.quantiles import median
-from nanorocks_ros.stages.tracking.bead_paths import column_medians, paths_of
+from nanorocks_ros.stages.tracking.bead_paths import (
+    Positions,
+    column_medians,
+    paths_of,
+    positions_at,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,6 +27,7 @@ if TYPE_CHECKING:
 # successive frames, of so many times the error of a frame: a swing of 1.5 Hz leaves 0.023 of
 # itself in it at 25 frames/s, registration all of its errors.
 _FOURTH = (1.0, -4.0, 6.0, -4.0, 1.0)
+_LAGS = (0, 1, 2, 3, 4)
 _FOURTH_ERROR = math.sqrt(70.0)
 # Fewest fourth differences, and fewest beads of each.
 _FEWEST_FOURTHS, _FEWEST_BEADS = 12, 3
@@ -59,10 +65,12 @@ class SharedError:
             times = [moments[-1 - k].time for k in range(count)]
             steps = [later - earlier for later, earlier in pairwise(times)]
             if max(steps) < _EVEN * min(steps):
-                paths, radii = paths_of(moments, tuple(range(count)))
-                if len(radii) >= _FEWEST_BEADS:
+                last = moments[-1]
+                positions = positions_at(moments, _LAGS)
+                beads, *sizes = _fourth_difference(positions, last.links, last.radii)
+                if beads >= _FEWEST_BEADS:
                     self._times.append(times[0])
-                    self._sizes.extend(_fourth_difference(paths))
+                    self._sizes.extend(sizes)
         self.error = 0.0
         if len(self._times) >= _FEWEST_FOURTHS:
             # Median over frames and components: collisions do not count.
@@ -70,10 +78,16 @@ class SharedError:
 
 
 @compiled
-def _fourth_difference(paths: NDArray[np.float64]) -> tuple[float, float]:
-    """Size of each component of the fourth difference of most paths, (5, n, 2)."""
+def _fourth_difference(
+    positions: Positions, links: NDArray[np.int32], radii: NDArray[np.float64]
+) -> tuple[int, float, float]:
+    """Number of beads seen in five frames, and the size of each component of their difference."""
+    paths, _ = paths_of(positions, links, _LAGS, radii)
+    beads = paths.shape[1]
+    if beads < _FEWEST_BEADS:
+        return beads, 0.0, 0.0
     fourth = np.zeros(paths.shape[1:])
     for k in range(len(_FOURTH)):
         fourth += _FOURTH[k] * paths[k]
     common = column_medians(fourth)
-    return abs(common[0]), abs(common[1])
+    return beads, abs(common[0]), abs(common[1])

@@ -16,8 +16,7 @@ from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviat
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
 from nanorocks_ros.stages.tracking.linking.track_snapshot import (
     allocate_snapshot,
-    count_seen,
-    in_metres,
+    write_in_metres,
 )
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 
@@ -221,8 +220,9 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
         end = 0
         for k, linker in enumerate(self._linkers):
             end = linker.write_snapshot(time, shift, k, snapshot, end)
-        order = np.argsort(snapshot.ids[:end], kind='stable')
-        beads = in_metres(snapshot, order, 1.0 / self._scale, displacement)
+        beads = allocate_snapshot(end)
+        counts = np.empty(self._expected.size, dtype=np.int64)
+        write_in_metres(snapshot, 1.0 / self._scale, displacement, beads, counts)
         return Tracks(
             stamp_ns=image.stamp_ns,
             tray=self._tray.number,
@@ -237,13 +237,12 @@ class Tracker(RestartingStage[TrayImage, Tracks]):
             radius_errors=beads.radius_errors,
             seen=beads.seen,
             expected=self._expected,
-            quality=image.quality | doubt | self._quality_of(beads.species, beads.seen),
+            quality=image.quality | doubt | self._quality_of(counts),
             cycle=image.cycle or 0,
         )
 
-    def _quality_of(self, species: NDArray[np.int32], seen: NDArray[np.bool_]) -> Quality:
+    def _quality_of(self, counts: NDArray[np.int64]) -> Quality:
         """FEW_BEADS if too few beads of a species are visible."""
-        counts = count_seen(species, seen, self._expected.size)
         is_short = (counts < _MIN_VISIBLE_SHARE * self._expected).any()
         return Quality.FEW_BEADS if is_short else Quality(0)
 

@@ -7,7 +7,13 @@ from collections import deque
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.bead_paths import Moment, column_medians, links_from, paths_of
+from nanorocks_ros.stages.tracking.bead_paths import (
+    Moment,
+    column_medians,
+    links_from,
+    paths_of,
+    positions_at,
+)
 
 
 def test_paths_are_those_of_beads_seen_in_all_frames_whatever_their_rows():
@@ -24,7 +30,8 @@ def test_paths_are_those_of_beads_seen_in_all_frames_whatever_their_rows():
                 before[row] = earlier[0] if earlier.size else -1
         last = links_from(before, last)
         moments.append(Moment(frame, places[frame, order], 1.0 * order, last, np.zeros(2)))
-    positions, radii = paths_of(moments, (0, 2, 5))
+    lags = (0, 2, 5)
+    positions, radii = paths_of(positions_at(moments, lags), last, lags, moments[-1].radii)
     always = [bead for bead in orders[-1] if all(bead in order for order in orders[-6:])]
     assert radii.tolist() == always
     assert (positions == places[[6, 4, 1]][:, always]).all()

@@ -54,11 +54,13 @@ _LEAST_SEEN = 0.5
 _DECILE = 0.2107
 
 
-class _Paths(NamedTuple):
+class FlightPaths(NamedTuple):
     """Paths begun, and the deviations of complete ones.
 
     Parameters
     ----------
+    lengths : ndarray (lengths,), [px]
+        Of half a path.
     tracks : ndarray of int64, (slots,)
         The track of each slot.
     stages : ndarray of int64, (slots, lengths)
@@ -73,6 +75,7 @@ class _Paths(NamedTuple):
         Variance over the stated one; NaN where it is unknown.
     """
 
+    lengths: NDArray[np.float64]
     tracks: NDArray[np.int64]
     stages: NDArray[np.int64]
     places: NDArray[np.float64]
@@ -92,6 +95,11 @@ class FlightDeviations:
         Error that all places of a bead share, until flights tell the errors.
     hidden : bool
         Whether that error is never seen in flights, as that of chalk that turns with a bead.
+
+    Attributes
+    ----------
+    paths : FlightPaths
+        `add_places` adds the places of each frame.
     """
 
     def __init__(self, radius_px: float, *, assumed: float = 0.0, hidden: bool = False) -> None:
@@ -99,9 +107,10 @@ class FlightDeviations:
         self._remaining = assumed if hidden else 0.0
         used = np.array(_PATHS_PX) <= _LONGEST_RADII * radius_px
         count = max(int(used.sum()), 1)
-        self._lengths = np.array(_PATHS_PX)[:count]
+        lengths = np.array(_PATHS_PX)[:count]
         self._alike = ALIKE_RADII * radius_px
-        self._paths = _Paths(
+        self.paths = FlightPaths(
+            lengths,
             np.full(_SLOTS, -1, dtype=np.int64),
             np.zeros((_SLOTS, count), dtype=np.int64),
             np.empty((_SLOTS, count, 2, 4)),
@@ -109,27 +118,6 @@ class FlightDeviations:
             np.zeros(count, dtype=np.int64),
             np.full(count, np.nan),
         )
-
-    def push(
-        self,
-        time: float,
-        ids: NDArray[np.int32],
-        places: NDArray[np.float64],
-        errors: NDArray[np.float64],
-    ) -> None:
-        """Take the beads seen in the next frame.
-
-        Parameters
-        ----------
-        time : float, [s]
-        ids : ndarray of int32, (n,)
-            Numbers of their tracks.
-        places : ndarray (n, 2), [px]
-            In a frame in which free beads fly straight.
-        errors : ndarray (n,), [px]
-            Stated errors of a coordinate.
-        """
-        _push(self._paths, self._lengths, time, ids, places, errors)
 
     @property
     def scaling(self) -> tuple[float, float]:
@@ -155,7 +143,7 @@ class FlightDeviations:
         """
         known: list[tuple[float, float]] = []
         for length, variance in zip(
-            self._lengths.tolist(), self._paths.variances.tolist(), strict=True
+            self.paths.lengths.tolist(), self.paths.variances.tolist(), strict=True
         ):
             if math.isnan(variance):
                 if known or length >= _FIRST_PX:
@@ -173,37 +161,55 @@ class FlightDeviations:
 
 
 @compiled
-def _push(
-    paths: _Paths,
-    lengths: NDArray[np.float64],
+def add_places(
+    paths: FlightPaths,
     time: float,
     ids: NDArray[np.int32],
     places: NDArray[np.float64],
     errors: NDArray[np.float64],
 ) -> None:
-    """See `FlightDeviations.push`."""
+    """Add the places of the beads seen in the next frame.
+
+    Parameters
+    ----------
+    paths : FlightPaths
+        Changed.
+    time : float, [s]
+    ids : ndarray of int32, (n,)
+        Numbers of their tracks.
+    places : ndarray (n, 2), [px]
+        In a frame in which free beads fly straight.
+    errors : ndarray (n,), [px]
+        Stated errors of a coordinate.
+    """
+    n_due = np.zeros(paths.lengths.size, dtype=np.int64)
+    due = np.empty((paths.lengths.size, _KEPT))
     for k in range(ids.size):
         slot = ids[k] % _SLOTS
         if paths.tracks[slot] != ids[k]:
             paths.tracks[slot] = ids[k]
             paths.stages[slot] = 0
         variance = errors[k] * errors[k]
-        for c in range(lengths.size):
+        for c in range(paths.lengths.size):
             square = _advance(
-                paths, slot, c, lengths[c], (time, places[k, 0], places[k, 1], variance)
+                paths, slot, c, paths.lengths[c], (time, places[k, 0], places[k, 1], variance)
             )
             if square >= 0.0:
                 count = paths.counts[c]
                 paths.squares[c, count % _KEPT] = square
                 paths.counts[c] = count + 1
                 if count + 1 >= _FEWEST and (count + 1) % _EVERY == 0:
-                    kept = paths.squares[c, : min(count + 1, _KEPT)]
-                    paths.variances[c] = straight_variance(kept)
+                    n_due[c] = min(count + 1, _KEPT)
+                    due[c, : n_due[c]] = paths.squares[c, : n_due[c]]
+    # In a frame with many beads several fits are due: the last one counts.
+    for c in range(paths.lengths.size):
+        if n_due[c]:
+            paths.variances[c] = straight_variance(due[c, : n_due[c]])
 
 
 @inlined
 def _advance(
-    paths: _Paths,
+    paths: FlightPaths,
     slot: int,
     c: int,
     length: float,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.numerics.compiled import inlined, kernel
+from nanorocks_ros.numerics.compiled import compiled, inlined, kernel
 from nanorocks_ros.stages.tracking.linking.link_probabilities import MIN_VELOCITY_CHANGE_PX_S
 from nanorocks_ros.stages.tracking.linking.track_store import TrackStore
 
@@ -67,23 +67,28 @@ def predict(
         positions[k, 0], positions[k, 1], variances[k] = x, y, variance
 
 
-@kernel
+@compiled
 def write_hints(
     tracks: TrackStore,
-    order: NDArray[np.int64],
-    positions: NDArray[np.float64],
-    origin: NDArray[np.float64],
+    time: float,
+    walls: Walls,
     least_error: float,
+    positions: NDArray[np.float64],
+    variances: NDArray[np.float64],
     hints: NDArray[np.float64],
 ) -> None:
-    """Write hints for the detection: column, row, radius and its error, (n, 4), [px].
+    """Predict the first n tracks, as `predict`, and write hints for their detection.
 
-    `order` holds the rows of the tracks in the order of the hints, `positions` the predictions in
-    the camera frame, and `origin` the position of the first pixel.
+    Hints are column, row, radius and its error, (n, 4), [px]. Beads with the largest visible share
+    come first: they lie on top.
     """
-    for row in range(order.size):
+    count = variances.size
+    predict(tracks, time, walls, positions, variances)
+    order = np.argsort(-tracks.visible_shares[:count], kind='mergesort')
+    for row in range(count):
         k = order[row]
-        hints[row, 0], hints[row, 1] = positions[k, 0] - origin[0], positions[k, 1] - origin[1]
+        hints[row, 0] = positions[k, 0] - walls.low[0]
+        hints[row, 1] = positions[k, 1] - walls.low[1]
         hints[row, 2] = tracks.radii[k]
         error = math.sqrt(1.0 / tracks.radius_weights[k] + MIN_RADIUS_VARIANCE)
         hints[row, 3] = max(error, least_error)

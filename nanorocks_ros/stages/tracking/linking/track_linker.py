@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightPaths, add_places
 from nanorocks_ros.stages.tracking.linking.link_probabilities import (
     MIN_VELOCITY_CHANGE_PX_S,
     RADIUS_NOISE_PX,
@@ -22,6 +24,7 @@ from nanorocks_ros.stages.tracking.linking.track_snapshot import TrackSnapshot, 
 from nanorocks_ros.stages.tracking.linking.track_store import (
     CONFIRM_FRAMES,
     LinkSettings,
+    TrackStore,
     allocate_tracks,
     update_tracks,
 )
@@ -128,8 +131,9 @@ class Linker:
         if self.follows_struck_beads:
             links = link_struck_beads(links, known_beads, detected, self.max_speed)
         self._grow(n_tracks, detections.radii.size)
-        self._n_tracks, n_new, self._speed = update_tracks(
+        self._n_tracks, n_new, self._speed = _update(
             self._tracks,
+            self._deviations.paths,
             n_tracks,
             links,
             detected,
@@ -142,15 +146,7 @@ class Linker:
         )
         self._started = True
         self._last_prediction = None
-        self._measure_errors(time)
         return int(n_new)
-
-    def _measure_errors(self, time: float) -> None:
-        """Compare stated errors of positions with how far these lie off straight flights."""
-        count, tracks = self._n_tracks, self._tracks
-        seen = (tracks.last_seen[:count] == time) & (tracks.hits[:count] >= CONFIRM_FRAMES)
-        positions, errors = tracks.positions[:count, 0], tracks.errors[:count, 0]
-        self._deviations.push(time, tracks.ids[:count][seen], positions[seen], errors[seen])
 
     def _grow(self, n_tracks: int, n_new: int) -> None:
         """Enlarge the store if it cannot hold `n_new` more tracks."""
@@ -172,7 +168,7 @@ class Linker:
 
         Walls reflect.
         """
-        # Called twice for each frame.
+        # Known from the hints.
         if self._last_prediction is None or self._last_prediction[0] != time:
             positions, variances = np.empty((self._n_tracks, 2)), np.empty(self._n_tracks)
             predict(self._tracks, time, self._walls(shift), positions, variances)
@@ -184,10 +180,11 @@ class Linker:
 
         Beads with the largest visible share come first: they lie on top.
         """
-        positions, _ = self._predicted(time, shift)
-        order = np.argsort(-self._tracks.visible_shares[: self._n_tracks], kind='stable')
-        hints = np.empty((self._n_tracks, 4))
-        write_hints(self._tracks, order, positions, shift, RADIUS_NOISE_PX, hints)
+        count = self._n_tracks
+        positions, variances, hints = np.empty((count, 2)), np.empty(count), np.empty((count, 4))
+        walls = self._walls(shift)
+        write_hints(self._tracks, time, walls, RADIUS_NOISE_PX, positions, variances, hints)
+        self._last_prediction = time, positions, variances
         return hints
 
     def positions(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -217,3 +214,33 @@ class Linker:
             snapshot,
             first,
         )
+
+
+@compiled
+def _update(
+    tracks: TrackStore,
+    paths: FlightPaths,
+    n_tracks: int,
+    links: NDArray[np.int64],
+    detected: DetectedBeads,
+    visible_shares: NDArray[np.float64],
+    time: float,
+    settings: LinkSettings,
+    speed: float,
+    first_id: int,
+    hits: int,
+) -> tuple[int, int, float]:
+    """Update the tracks, as `update_tracks`, and compare their places with straight flights."""
+    n_tracks, n_new, speed = update_tracks(
+        tracks, n_tracks, links, detected, visible_shares, time, settings, speed, first_id, hits
+    )
+    ids, errors = np.empty(n_tracks, dtype=np.int32), np.empty(n_tracks)
+    places = np.empty((n_tracks, 2))
+    count = 0
+    for k in range(n_tracks):
+        if tracks.last_seen[k] == time and tracks.hits[k] >= CONFIRM_FRAMES:
+            ids[count], errors[count] = tracks.ids[k], tracks.errors[k, 0]
+            places[count] = tracks.positions[k, 0]
+            count += 1
+    add_places(paths, time, ids[:count], places[:count], errors[:count])
+    return n_tracks, n_new, speed

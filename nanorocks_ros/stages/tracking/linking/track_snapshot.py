@@ -52,9 +52,9 @@ class TrackSnapshot(NamedTuple):
     seen: NDArray[np.bool_]
 
 
-@compiled
 def allocate_snapshot(size: int) -> TrackSnapshot:
     """Allocate an uninitialised snapshot for so many beads."""
+    # Nine arrays from a compiled function take ten times as long.
     return TrackSnapshot(
         np.empty(size, dtype=np.int32),
         np.empty(size, dtype=np.int32),
@@ -139,28 +139,33 @@ def write_snapshot(
 
 
 @compiled
-def in_metres(
+def write_in_metres(
     snapshot: TrackSnapshot,
-    order: NDArray[np.int64],
     metres_per_pixel: float,
     displacement: NDArray[np.float64],
-) -> TrackSnapshot:
-    """Sort a snapshot and convert it to metres in the tray frame.
+    scaled: TrackSnapshot,
+    seen: NDArray[np.int64],
+) -> None:
+    """Sort a snapshot by number, convert it to metres in the tray frame, and count.
 
     Parameters
     ----------
     snapshot : TrackSnapshot
-    order : ndarray of int64, (n,)
-        Rows in the new order.
     metres_per_pixel : float, [m/px]
     displacement : ndarray (2,), [m]
         Displacement of the tray.
+    scaled : TrackSnapshot
+        Written; as many rows of `snapshot` are used as it has.
+    seen : ndarray of int64, (species,)
+        Written: number of visible beads of each species.
     """
-    scaled = allocate_snapshot(order.size)
+    seen[:] = 0
+    order = np.argsort(snapshot.ids[: scaled.ids.size], kind='mergesort')
     for row in range(order.size):
         k = order[row]
         scaled.ids[row], scaled.species[row] = snapshot.ids[k], snapshot.species[k]
         scaled.seen[row] = snapshot.seen[k]
+        seen[snapshot.species[k]] += snapshot.seen[k]
         for axis in range(2):
             scaled.positions[row, axis] = (
                 metres_per_pixel * snapshot.positions[k, axis] - displacement[axis]
@@ -170,15 +175,3 @@ def in_metres(
         scaled.velocity_errors[row] = metres_per_pixel * snapshot.velocity_errors[k]
         scaled.radii[row] = metres_per_pixel * snapshot.radii[k]
         scaled.radius_errors[row] = metres_per_pixel * snapshot.radius_errors[k]
-    return scaled
-
-
-@compiled
-def count_seen(
-    species: NDArray[np.int32], seen: NDArray[np.bool_], n_species: int
-) -> NDArray[np.int64]:
-    """Number of visible beads of each species."""
-    counts = np.zeros(n_species, dtype=np.int64)
-    for k in range(species.size):
-        counts[species[k]] += seen[k]
-    return counts

@@ -7,6 +7,7 @@ import pytest
 
 from nanorocks_ros.stages.tracking.linking.flight_deviations import (
     FlightDeviations,
+    add_places,
     straight_variance,
 )
 
@@ -45,8 +46,8 @@ def learnt(error, *, alike=0.0, radius=8.0, mean_free_path=np.inf, seconds=12.0,
             if lines
             else rng.normal(0.0, error, (BEADS, 2))
         )  # fmt: skip
-        deviations.push(
-            frame / RATE, np.arange(BEADS, dtype=np.int32), positions + wrong,
+        add_places(
+            deviations.paths, frame / RATE, np.arange(BEADS, dtype=np.int32), positions + wrong,
             np.full(BEADS, STATED),
         )  # fmt: skip
     return deviations
