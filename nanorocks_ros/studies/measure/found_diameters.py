@@ -140,7 +140,8 @@ def with_found_diameters(
         material = film.trays[key.tray].species[key.species].material
         notices.append(
             f'{name}: the diameter of {material} in tray {key.tray} is found in the film: '
-            f'{diameters[key]:.4g} mm, from {found}; {DIAMETER}: {diameters[key]:.4g} keeps it'
+            f'{diameters[key]:.4g} mm at {film.scale:.6g} px/m, from {found}; '
+            f'{DIAMETER}: {diameters[key]:.4g} keeps it'
         )
     text = with_diameters(file, diameters)
     return FoundTrays(replace(settings, trays_file=text), tuple(notices))
