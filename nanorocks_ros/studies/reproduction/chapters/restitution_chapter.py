@@ -6,6 +6,7 @@ Tested by ``test/studies/reproduction/test_reproduce_paper.py``.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
@@ -85,7 +86,7 @@ def restitution_chapter(context: Context) -> Chapter:
         _energy_part(context),
         Table(
             head=('tray', 'its closed form, calibrated area', 'its closed form, our speeds',
-                  'ours, beads [95 %]', 'ours, walls [95 %]', 'cycles known'),
+                  'ours, beads [95 %]', 'ours, walls [95 %]', 'cycles known', 'flags'),
             rows=rows,
             caption='Restitution by tray, mean over the cycles without sticking; ± standard error '
             'of that mean (none for a single cycle), and in brackets the mean ends of the '
@@ -95,7 +96,8 @@ def restitution_chapter(context: Context) -> Chapter:
             f'to {reported.PAPER_RESTITUTION_RANGE[1]:g} over all trays; the other values are in '
             'the inset of its figure alone. A dash: no reliable '
             'value, as for grains, which are not tracked, or an area that does not follow the '
-            'marked beads.',
+            'marked beads. Flags, with the number of cycles that have each, warn of a value: with '
+            'few_beads and uncertain its interval may not hold the truth.',
         ),
         *_errata(),
         *_search_parts(context),
@@ -228,7 +230,15 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
         beads = _with_interval(known, 'restitution')
         walls = _with_interval(known, 'wall_restitution')
         rows.append(
-            (str(tray), paper_method, paper_formula, beads, walls, f'{len(known)} of {len(ours)}')
+            (
+                str(tray),
+                paper_method,
+                paper_formula,
+                beads,
+                walls,
+                f'{len(known)} of {len(ours)}',
+                _flags(known),
+            )
         )
         if tray in (1, 3, 5):
             reported_value = f'{reported.PAPER_RESTITUTION:g}' if tray == 1 else ''
@@ -242,6 +252,12 @@ def _by_tray(context: Context) -> tuple[list[Sequence[str]], list[Difference]]:
                 )
             )
     return rows, differences
+
+
+def _flags(cycles: Sequence[dict[str, Any]]) -> str:
+    """The flags of some cycles, and of how many each."""
+    words = Counter(word for cycle in cycles for word in cycle.get('quality', ()))
+    return ', '.join(f'{word} {times}' for word, times in sorted(words.items()) if word != 'good')
 
 
 def _by_calibrated_area(context: Context, tray: Tray) -> list[float]:
