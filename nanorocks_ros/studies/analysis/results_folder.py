@@ -77,7 +77,10 @@ def check_results_folder(folder: Path) -> Path:
         raise RecordingError(
             str(folder), 'is named by its place alone', f'pass --output {folder.resolve()}'
         )
-    check_new_folder(folder)
+    try:
+        check_new_folder(folder)
+    except RecordingError as error:
+        raise RecordingError(str(folder), error.what, 'pass a writable --output') from error
     with suppress(OSError):
         delete_unfinished_folders(folder.parent, folder.name)
     if folder.exists() and not (folder / RESULTS_MARK).is_file():
