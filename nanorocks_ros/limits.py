@@ -186,6 +186,12 @@ YAML_DEPTH = Limit(
     unit='levels',
     quantity='nesting of a YAML text',
 )
+BEADS = Limit(
+    name='beads',
+    default=1_000_000,
+    unit='beads',
+    quantity='beads of a species in a trays file',
+)
 DIGITS = Limit(
     name='digits',
     default=400,
@@ -228,6 +234,7 @@ LIMITS = (
     YAML_BYTES,
     YAML_NODES,
     YAML_DEPTH,
+    BEADS,
     DIGITS,
     ARRAY_BYTES,
     TEXT_BYTES,

@@ -10,6 +10,7 @@ import os
 import socket
 import threading
 import time
+from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -259,13 +260,18 @@ class PageServer:
         except ValueError:
             # aiohttp expects plain ASCII in the heads of the handshake.
             return web.Response(status=400, text='no handshake\n')
+        except ConnectionResetError:
+            # Gone already, which is no fault of the server: nobody gets this answer.
+            return web.Response(status=400, text='gone\n')
         pause_s = 1.0 / self._settings.picture_rate
         client = Client(connection, self._board, self._pictures, pause_s)
         self._clients.add(client)
         sender = asyncio.ensure_future(client.run(self._greeting))
         # When the server ends, it is by an exception in here.
         try:
-            await self._hear(connection, client)
+            # Whoever is gone when a ping is answered is no fault of the server.
+            with suppress(ConnectionResetError):
+                await self._hear(connection, client)
         finally:
             sender.cancel()
             self._clients.discard(client)

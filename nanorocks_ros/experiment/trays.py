@@ -30,6 +30,7 @@ from nanorocks_ros.experiment.yaml_lines import (
     parse_yaml,
     shown_name,
 )
+from nanorocks_ros.limits import BEADS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -294,6 +295,9 @@ class _TrayFile(YamlLines):
         value = self.positive(node)
         if not value.is_integer():
             raise self.error(node, f'count {value:g} is no whole number', 'correct it')
+        if value > BEADS.value:
+            above = BEADS.exceeded(int(value), ConfigurationError, '')
+            raise self.error(node, above.what, above.do)
         return int(value)
 
     def _flag(self, node: yaml.Node | None) -> bool:

@@ -69,6 +69,32 @@ def _check_target(path: Path, *, folder: bool, force: bool) -> None:
         raise RecordingError(
             str(path), f'the folder {path.parent} cannot be written to', 'write elsewhere'
         )
+    _check_names(path.parent, path)
+    _try_to_write(path.parent, path)
+
+
+def _check_names(folder: Path, path: Path) -> None:
+    """Raise for names that are longer than the file system of a folder takes."""
+    longest = os.pathconf(folder, 'PC_NAME_MAX')
+    for name in path.parts:
+        if len(os.fsencode(name)) > longest:
+            raise RecordingError(
+                str(path),
+                f'a name in it has {len(os.fsencode(name))} bytes',
+                f'use at most {longest}',
+            )
+
+
+def _try_to_write(folder: Path, path: Path) -> None:
+    """Raise where no file can be made, whatever the permissions say."""
+    try:
+        part, lock = open_unfinished(folder / path.name)
+        part.unlink(missing_ok=True)
+        os.close(lock)
+    except OSError as error:
+        raise RecordingError(
+            str(path), f'cannot be written ({error.strerror})', 'write elsewhere'
+        ) from error
 
 
 def check_new_folder(path: Path) -> None:
@@ -85,7 +111,7 @@ def check_new_folder(path: Path) -> None:
         When a part of the path is no folder, or cannot be written to.
     """
     folder = path
-    while not os.path.lexists(folder):
+    while not os.path.lexists(folder) and folder != folder.parent:
         folder = folder.parent
     if not folder.is_dir():
         what = 'is no folder' if folder == path else f'{folder} is no folder'
@@ -94,6 +120,9 @@ def check_new_folder(path: Path) -> None:
         raise RecordingError(
             str(path), f'the folder {folder} cannot be written to', 'write elsewhere'
         )
+    _check_names(folder, path)
+    if folder != path:
+        _try_to_write(folder, path)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import asyncio
 import http.client
 import json
 import socket
+import struct
 from contextlib import asynccontextmanager
 from dataclasses import replace
 
@@ -263,6 +264,24 @@ def _text_frame(message):
     content = json.dumps(message).encode()
     assert len(content) < 126
     return bytes((0x81, 0x80 | len(content))) + bytes(4) + content  # masked with zeros
+
+
+def test_whoever_leaves_behind_many_pings_is_no_fault_of_the_server(serve, caplog):
+    server = serve()
+    for _ in range(5):
+        client = raw_client(server)
+        client.sendall((b'\x89\x80' + bytes(4)) * 5000)
+        # It is reset at once, not closed in good order.
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
+        client.close()
+
+    async def check():
+        async with live(server):
+            pass
+
+    asyncio.run(check())
+    server.stop()
+    assert [record.message for record in caplog.records if record.levelname == 'ERROR'] == []
 
 
 def drained(client):

@@ -147,6 +147,12 @@ def test_a_tray_that_does_not_exist_is_named_with_those_that_do():
     [
         ('count: 15', 'count: 0', r':6: 0 is no positive number'),
         ('count: 15', 'count: 1.5', r':6: count 1.5 is no whole number'),
+        (
+            'count: 15',
+            'count: 2000000',
+            r':6: beads of a species .* set NANOROCKS_MAX_BEADS to more',
+        ),
+        ('count: 15', 'count: 0x7fffffffffffffffff', r':6: beads of a species .*above the limit'),
         ('count: 15', 'count: many', r":6: 'many' is no positive number"),
         ('diameter_mm: 2', 'diameter_mm: .nan', r':6: nan is no positive number'),
         ('diameter_mm: 2', 'diameter_mm: -2', r':6: -2 is no positive number'),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
@@ -101,3 +103,17 @@ def test_a_folder_below_a_file_is_refused_before_the_work(tmp_path):
     (tmp_path / 'file').touch()
     with pytest.raises(RecordingError, match='is no folder; write elsewhere'):
         check_outputs({'--bag': tmp_path / 'file' / 'deep' / 'bag'}, {})
+
+
+def test_a_name_that_is_too_long_is_refused_before_the_work(tmp_path):
+    long = 'x' * 300
+    for files in ({'--table': tmp_path / f'{long}.npz'}, {'--bag': tmp_path / long / 'bag'}):
+        with pytest.raises(RecordingError, match=r'a name in it has 30\d bytes; use at most 255'):
+            check_outputs(files, KINDS)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_takes_no_file_whatever_its_permissions_is_refused_before_the_work():
+    for files in ({'--table': Path('/proc/a.npz')}, {'--bag': Path('/proc/bag')}):
+        with pytest.raises(RecordingError, match='cannot be written'):
+            check_outputs(files, KINDS)

@@ -16,6 +16,7 @@ import numpy as np
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
+from nanorocks_ros.outputs.atomic_files import check_new_folder
 from nanorocks_ros.outputs.table_files import PACKAGE, write_package, write_table
 from nanorocks_ros.outputs.unfinished_files import (
     delete_unfinished_folders,
@@ -76,6 +77,10 @@ def check_results_folder(folder: Path) -> Path:
         raise RecordingError(
             str(folder), 'is named by its place alone', f'pass --output {folder.resolve()}'
         )
+    try:
+        check_new_folder(folder)
+    except RecordingError as error:
+        raise RecordingError(str(folder), error.what, 'pass a writable --output') from error
     with suppress(OSError):
         delete_unfinished_folders(folder.parent, folder.name)
     if folder.exists() and not (folder / RESULTS_MARK).is_file():
@@ -142,6 +147,9 @@ def write_results(
         raise UnwritableError(
             str(folder), f'cannot be written: {error.strerror}', 'pass a writable --output'
         ) from error
+    except RecordingError as error:
+        # Not the hidden file that was written.
+        raise UnwritableError(str(folder), error.what, error.do) from error
 
 
 def _keep_others(folder: Path, fresh: Path) -> None:

@@ -93,7 +93,12 @@ def cached_import(film: Path, progress: Callable[[float], None]) -> CachedFilm:
     # Of other films, too.
     delete_unfinished_folders(folder)
     with unfinished_folder(bag) as part:
-        imported = import_films([film], part / bag.name, ImportSettings(), progress)
+        try:
+            imported = import_films([film], part / bag.name, ImportSettings(), progress)
+        except RecordingError as error:
+            # Not the hidden folder that was written.
+            where = error.where.replace(str(part), str(folder))
+            raise RecordingError(where, error.what, error.do) from error
         with suppress(FileNotFoundError):
             record.unlink()
         shutil.rmtree(bag, ignore_errors=True)

@@ -278,7 +278,7 @@ def test_where_results_cannot_go_is_said_before_anything_is_analysed(capsys, tmp
     (thesis / 'chapter.txt').write_text('precious')
     for output, message in (
         (thesis, f'{thesis}: exists and holds no results of ours; pass another --output'),
-        ('/proc/out', '/proc: cannot be written'),
+        ('/proc/out', '/proc/out: cannot be written'),
     ):
         assert run('analyse', SAMPLE, '-o', output) == 1
         printed = capsys.readouterr()

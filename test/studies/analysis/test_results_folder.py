@@ -7,12 +7,13 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from resource import RLIMIT_FSIZE, getrlimit, setrlimit
 
 import numpy as np
 import pytest
 
 from benchmarks.file_steps import kill_at_each_step, run_until, was_killed
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.outputs.csv_tables import number
 from nanorocks_ros.outputs.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.reader import open_bag
@@ -163,6 +164,28 @@ def test_a_folder_without_a_name_is_refused_before_the_work(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path / 'out')
     with pytest.raises(RecordingError, match=r'pass --output /.*/out$'):
         check_results_folder(Path())
+
+
+def test_a_place_that_cannot_be_a_folder_is_refused_before_the_work(tmp_path):
+    (tmp_path / 'file').write_text('mine')
+    (tmp_path / 'link').symlink_to(tmp_path / 'nowhere')
+    for path in (tmp_path / 'file' / 'out', tmp_path / 'link'):
+        with pytest.raises(RecordingError, match='is no folder'):
+            check_results_folder(path)
+    assert (tmp_path / 'file').read_text() == 'mine'
+
+
+def test_a_full_disk_names_the_folder_and_leaves_nothing(tmp_path):
+    soft, hard = getrlimit(RLIMIT_FSIZE)
+    setrlimit(RLIMIT_FSIZE, (2000, hard))
+    try:
+        with pytest.raises(UnwritableError) as refused:
+            write_results(analysis(), tmp_path / 'out', tmp_path / 'bag', PipelineSettings())
+    finally:
+        setrlimit(RLIMIT_FSIZE, (soft, hard))
+    assert refused.value.where == str(tmp_path / 'out')
+    assert 'cannot be written (File too large)' in refused.value.what
+    assert list(tmp_path.iterdir()) == []
 
 
 def full_analysis():
