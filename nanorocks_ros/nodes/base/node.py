@@ -116,7 +116,7 @@ class NanorocksNode(Node):
         self.diagnostics.publish([Problem(Level.OK, text)])
 
     def check_parameters(self) -> None:
-        """Refuse unknown parameters, once the node is complete.
+        """Refuse unknown parameters, once the node is complete; tell what it does without.
 
         Raises
         ------
@@ -129,6 +129,8 @@ class NanorocksNode(Node):
             self.resolve_topic_name(topic.of(tray)) for topic in later for tray in range(1, 9)
         }
         self.parameters.refuse_overrides_of_unknown_topics({*names, '/clock'})
+        if self.outputs.untyped:
+            self.get_logger().info(self.outputs.untyped)
 
     def start_recording(self) -> None:
         """Open the recording of a node that makes one; from then on it has to be closed."""

@@ -75,6 +75,8 @@ class Outputs:
         Gets everything that is published, too.
     publishes_images : bool
         Whether `publish_result` publishes images, too.
+    untyped : str
+        Why arrays are offered without typed messages beside them; empty if they are not.
     """
 
     def __init__(self, node: Node, diagnostics: Diagnostics, events: CallbackGroup) -> None:
@@ -82,6 +84,7 @@ class Outputs:
         self._by_name: dict[str, Publisher] = {}
         self.recorder: ResultRecorder | None = None
         self.publishes_images = True
+        self.untyped = ''
 
     def publisher(self, topic: Topic, tray: int = 0) -> Publisher:
         """The publisher of a topic, made once."""
@@ -108,9 +111,8 @@ class Outputs:
             typed = _TYPED_BESIDE.get(topic.name)
             if typed is None:
                 continue
-            if problem := typed_problem():
-                self._node.get_logger().info(problem, once=True)
-            else:
+            self.untyped = typed_problem()
+            if not self.untyped:
                 self.publisher(typed, tray)
 
     def is_offered(self, topic: Topic) -> bool:

@@ -52,7 +52,7 @@ def examine_graph(answer: dict[str, Any], processes: Sequence[NodeProcess]) -> l
     near = [process for process in processes if process.is_near and not process.is_renamed]
     findings = [
         *(finding for report in reports for finding in _node_findings(report)),
-        *_silent_nodes(reports, near),
+        *_silent_nodes(_reporting(listed, reports), near),
         *(
             _topic_finding(topic, listed)
             for topic in listed
@@ -88,11 +88,22 @@ def _said(node: str, status: Status, text: str) -> Finding:
     return Finding(name=node, status=status, found=found, remedy=remedy)
 
 
-def _silent_nodes(
-    reports: list[dict[str, Any]], processes: Sequence[NodeProcess]
-) -> list[Finding]:
+def _reporting(listed: list[dict[str, Any]], reports: list[dict[str, Any]]) -> Counter[str]:
+    """How many nodes of each name report; two may have the same one."""
+    senders = Counter(
+        publisher['node']
+        for topic in listed
+        if topic['name'] == '/diagnostics'
+        for publisher in topic['publishers']
+    )
+    counts: Counter[str] = Counter()
+    for report in reports:
+        counts[report['node'].rpartition('/')[2]] += max(senders[report['node']], 1)
+    return counts
+
+
+def _silent_nodes(heard: Counter[str], processes: Sequence[NodeProcess]) -> list[Finding]:
     """Nodes of this machine that should be heard, but did not report."""
-    heard = Counter(report['node'].rpartition('/')[2] for report in reports)
     silent = []
     for name in sorted({process.name for process in processes}):
         pids = [str(process.pid) for process in processes if process.name == name]

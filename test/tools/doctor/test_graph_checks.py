@@ -123,3 +123,7 @@ def test_a_node_that_runs_and_does_not_report_is_told(monkeypatch):
     assert silent.name == 'haff_fitter (process 8)'
     renamed = NodeProcess(8, 'haff_fitter', {}, is_renamed=True)
     assert len(examine_graph(answer(reports=[report]), [processes[0], renamed])) == 1
+    # Two of the same name, of which the probe keeps one report.
+    both = [NodeProcess(pid, 'pipeline', {}) for pid in (7, 8)]
+    sent = listed('/diagnostics', ['/lab/pipeline', '/lab/pipeline'], types=['Diagnostics'])
+    assert len(examine_graph(answer(sent, reports=[report]), both)) == 1
