@@ -100,9 +100,9 @@ class TrackReliability:
         self._frames += 1
         if self.hopeless:
             return
-        share /= 1.0 - self.hidden
         self.judged = self._frames >= _MEMORY_FRAMES
-        self._enough = share >= self._enough_share[int(self.reliable)]
+        self._enough = share >= (1.0 - self.hidden) * self._enough_share[int(self.reliable)]
+        # Beads that lie under others can touch those that are seen.
         self._nearly_all = share >= (_STILL_ENOUGH if self.reliable_contacts else _ENOUGH)
         if self.judged:
             self._conclude()

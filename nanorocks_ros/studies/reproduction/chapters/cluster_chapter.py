@@ -75,8 +75,8 @@ def cluster_chapter(context: Context) -> Chapter:
             f'{100.0 * paper.share:.1f}',
         )
         counts += [
-            (str(number), *by_hand, 'truth', *_table_3_cells(truth)),
-            ('', '', '', '', 'ours', *_table_3_cells(ours)),
+            (str(number), *by_hand, 'truth', *table_3_cells(truth)),
+            ('', '', '', '', 'ours', *table_3_cells(ours)),
         ]
         ends = [cycle.first_cycle(number) for cycle in context.sticking]
         size = _with_own_error(
@@ -86,7 +86,7 @@ def cluster_chapter(context: Context) -> Chapter:
         true_size = mean_text([end.weighted_size for end in truth])
         sizes.append((str(number), size, true_size))
         if number in _TRAYS:
-            shares = [_table_3_cells(end)[2] for end in (ours, truth)]
+            shares = [table_3_cells(end)[2] for end in (ours, truth)]
             quantity = f'beads in clusters at the end, tray {number} [%]'
             differences.append(Difference(quantity, by_hand[2], '', *shares))
             quantity = f'cluster size at the end, weight-averaged, tray {number} [beads]'
@@ -122,10 +122,10 @@ def cluster_chapter(context: Context) -> Chapter:
             'clusters and shares ± standard error, by the scatter of the cycles or the errors of '
             'our counts, whichever is larger; beads in each ± mean absolute deviation of the '
             'cycles as in the paper. '
-            'A dash: not counted, since chalk hides beads or grains are too many. The counts of '
-            'the flight need not agree with these: its sticking speed is unknown, and simulated '
-            'clusters do not break, so that nearly all beads end in one cluster, where the paper '
-            'counted several. '
+            'A dash: counted in fewer than half of the cycles, since chalk hides beads or grains '
+            'are too many. The counts of the flight need not agree with these: its sticking '
+            'speed is unknown, and simulated clusters do not break, so that nearly all beads end '
+            'in one cluster, where the paper counted several. '
             'In tray 4 the paper divides by the beads that the glare of the LEDs leaves visible: '
             'its 85.6 % are 64.2 % of all beads.',
         ),
@@ -185,10 +185,19 @@ def tracked_end(cycle: CycleFiles, tray: Tray) -> ClusterEnd:
     return ClusterEnd(clusters, mean, share, size, clusters_error, share_error)
 
 
-def _table_3_cells(ends: Sequence[ClusterEnd]) -> tuple[str, str, str]:
-    """Clusters, beads in each, and share of the beads in clusters, [%]."""
+def table_3_cells(ends: Sequence[ClusterEnd]) -> tuple[str, str, str]:
+    """Clusters, beads in each, and share of the beads in clusters, [%].
+
+    Parameters
+    ----------
+    ends : sequence of ClusterEnd
+        Of the cycles of a tray. Where fewer than half of them are known nothing is.
+    """
     each = np.array([end.beads_per_cluster for end in ends])
     each = each[np.isfinite(each)]
+    if 2 * sum(math.isfinite(end.clusters) for end in ends) < len(ends):
+        # The few cycles in which tracks are left are not like the others.
+        return NOT_KNOWN, NOT_KNOWN, NOT_KNOWN
     deviation = float(np.abs(each - each.mean()).mean()) if each.size > 1 else math.nan
     return (
         _with_own_error([end.clusters for end in ends], [end.clusters_error for end in ends]),
