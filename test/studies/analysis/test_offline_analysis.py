@@ -257,7 +257,7 @@ def text_file(path):
     ('make', 'message'),
     [
         (lambda path: path, 'does not exist'),
-        (text_file, 'not a bag'),
+        (text_file, 'neither a video nor a bag'),
         (empty_bag, 'holds no messages'),
         (other_bag, r'(found '),
         (lambda path: raw_bag(path, at_30_hz(3), encoding='bayer_rggb16'), 'bayer_rggb16'),
