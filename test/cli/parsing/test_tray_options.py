@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from nanorocks_ros.cli.main import build_parser, main
 from nanorocks_ros.errors import ConfigurationError
 
+SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
 FLAGS = '--tray', '--trays', '--trays-file'
 
 
@@ -46,7 +49,7 @@ def test_every_kind_is_tested():
         ['figure', 'decay', 'a', '-o', 'a.png', '--tray', 'mine.yaml'],
         ['library', '-o', 'a.npz', '--tray', 'mine.yaml'],
         ['simulate', '--tray', 'mine.yaml'],
-        ['track', 'a', '--trays', 'mine.yaml'],
+        ['track', str(SAMPLE), '--trays', 'mine.yaml'],
     ],
 )
 def test_a_file_in_place_of_a_number_is_refused_with_the_option_that_takes_it(capsys, words):
