@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.limits import IMAGE_PIXELS, require_regular_file
 from nanorocks_ros.recordings.film.display_rotation import UNROTATED, rotation_of, rotation_text
-from nanorocks_ros.recordings.film.film_losses import FilmLosses, ends_in_packet, stated_duration
+from nanorocks_ros.recordings.film.film_losses import FilmLosses, cut_end, stated_duration
 from nanorocks_ros.recordings.film.film_source import (
     EncodedImage,
     FilmFrame,
@@ -194,7 +194,8 @@ class Video:
             self._losses = FilmLosses(
                 self.info.expected,
                 stated_duration(container, stream),
-                in_packet=ends_in_packet(self.info.path, container),
+                cut_end=cut_end(self.info.path, container),
+                timed=self._rate is None,
             )
             for number, frame in enumerate(self._stored_or_decoded_frames(container, stream)):
                 if self._rate is None:

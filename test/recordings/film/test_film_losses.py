@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from nanorocks_ros.recordings.film.video import Video
 
@@ -117,3 +118,53 @@ def test_missing_blocks_of_a_film_without_a_stated_count_are_told(tmp_path):
     film, count = read(path)
     assert count < FRAMES - 20
     assert film.losses
+
+
+@pytest.mark.parametrize(('share', 'padding', 'is_told'), [
+    (1.0, b'', False), (1.0, bytes(300), False), (0.5, b'', True), (0.9, b'', True),
+])  # fmt: skip
+def test_a_gif_without_its_end_was_cut(tmp_path, share, padding, is_told):
+    path = tmp_path / 'x.gif'
+    images = [Image.new('L', (64, 48), 40 * number) for number in range(6)]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=40)
+    content = path.read_bytes()
+    path.write_bytes(content[: round(share * len(content))] + padding)
+    film, count = read(path)
+    assert count == len(images) or is_told
+    assert film.losses == (('ends without the mark of its end: it was cut short',) * is_told)
+
+
+@pytest.mark.parametrize('frames', [15, 90])
+def test_a_far_last_time_is_told(tmp_path, frames):
+    path = tmp_path / 'x.mkv'
+    with av.open(str(path), 'w') as container:
+        stream = container.add_stream('mjpeg', rate=30)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, 'yuvj420p'
+        stream.time_base = Fraction(1, 1000)
+        for number in range(frames):
+            pixels = np.full((48, 64, 3), 2 * number, dtype=np.uint8)
+            frame = av.VideoFrame.from_ndarray(pixels, format='bgr24')
+            frame.pts = 1000 * (1_000_000 if number == frames - 1 else number) // 30
+            frame.time_base = Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    film, count = read(path)
+    assert count == frames
+    (loss,) = film.losses
+    assert loss.startswith('jumps by 3333')
+    assert 'joins recordings of different times' in loss
+
+
+def test_a_rate_that_hardly_a_camera_has_is_told(tmp_path):
+    path = write(tmp_path / 'x.avi', *KINDS['avi'])
+    content = bytearray(path.read_bytes())
+    header = content.index(b'strh') + 8
+    # Scale and rate of the stream.
+    content[header + 20 : header + 28] = (1).to_bytes(4, 'little') + bytes([255]) * 4
+    path.write_bytes(content)
+    film, count = read(path)
+    assert count == FRAMES
+    assert any('not the rate of the camera' in loss for loss in film.losses)
+    told = Video(path, Fraction(30), threads=1)
+    assert sum(1 for _ in told.frames()) == FRAMES
+    assert not any('rate' in loss for loss in told.losses)
