@@ -80,7 +80,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         self._tray = tray
         self._take(settings)
         self._grains = any(species.properties.shape == 'grain' for species in tray.species)
-        self._contacts = CycleContacts(self._settings)
+        self._contacts = CycleContacts(self._settings, among_grains=self._grains)
         self._sticking = CycleSticking(settings, tray)
         self.reset()
 

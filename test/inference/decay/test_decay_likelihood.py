@@ -49,6 +49,26 @@ def test_nuisances_are_integrated_over_as_by_a_determinant_and_an_inverse():
     np.testing.assert_allclose(likelihood.integrated(), expected, rtol=1e-11, atol=1e-11)
 
 
+@pytest.mark.parametrize('gradient', [0.0, 3.0, -250.0])
+def test_the_deviation_is_that_of_the_likeliest_nuisances(gradient):
+    information, expected = 80.0, 900.0
+    likelihood = DecayLikelihood(
+        log_likelihood=np.zeros(2),
+        start=np.zeros(2),
+        gradient=np.array([[0.0], [gradient]]),
+        information=np.full((2, 1, 1), information),
+        deviation=np.array([5.0, expected]),
+        samples=40,
+        decays=1,
+    )
+    nuisance = np.linspace(-4.0, 4.0, 80_001)
+    log_likelihood = gradient * nuisance - 0.5 * information * nuisance**2
+    likeliest = np.argmax(log_likelihood - 0.5 * nuisance**2)
+    least = expected - 2.0 * log_likelihood[likeliest]
+    assert likelihood.deviation_at(1) == pytest.approx(least, abs=1e-2)
+    assert likelihood.deviation_at(0) == 5.0
+
+
 def test_frictions_are_compared_up_to_the_next_one_above_the_highest(tables):
     decay = TIMES, SPEEDS, 0.02 * SPEEDS, (0.01, 0.01)
     whole = decay_likelihood(tables, *decay)

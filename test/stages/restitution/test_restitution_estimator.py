@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bent_flights import bent_flights
+from contact_draws import drawn_collision
 from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.errors import ConfigurationError
@@ -583,3 +584,18 @@ def test_speeds_of_grains_have_errors_of_their_own_by_either_method(method):
         assert math.isfinite(grains.haff_time.value)
         widths.append(grains.restitution.upper - grains.restitution.lower)
     assert widths[0] > 1.5 * widths[1]
+
+
+@pytest.mark.parametrize(('number', 'counted'), [(3, 12), (7, 0)])
+def test_collisions_of_beads_among_grains_do_not_count(number, counted):
+    tray = load_trays()[number]
+    rng = np.random.default_rng(4)
+    contacts = [
+        replace(drawn_collision(rng, 0.6), stamp_ns=k * NS, tray=number, cycle=1)
+        for k in range(3, 15)
+    ]
+    rebounds = list(wall_rebounds(rng, 30, 2.0, 17.0))
+    stage = RestitutionEstimator(PipelineSettings(), tray)
+    *_, final = all_estimates(stage, by_stamp([*cooling_cycle(), *contacts, *rebounds]))
+    assert (final.collisions, final.rebounds) == (counted, 30)
+    assert math.isnan(final.contact_restitution.value) is (counted == 0)
