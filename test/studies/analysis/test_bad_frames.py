@@ -92,11 +92,11 @@ def test_without_a_lens_the_picture_is_taken_as_straight_and_that_is_said(tmp_pa
     without = analyse(bag_of(tmp_path / 'without', pictures), PipelineSettings())
     with_one = analyse(bag_of(tmp_path / 'with', pictures, info=lens()), PipelineSettings())
     notices = [
-        [notice for notice in analysis.notices if 'straight' in notice]
+        [notice for notice in analysis.notices if 'free of distortion' in notice]
         for analysis in (without, with_one)
     ]
     assert len(notices[0]) == 1
-    assert 'no camera_info and no calibration file' in notices[0][0]
+    assert 'neither camera_info nor a calibration file' in notices[0][0]
     assert notices[1] == []
 
 

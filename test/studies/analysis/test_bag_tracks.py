@@ -97,9 +97,9 @@ def test_parquet_in_many_groups_of_rows_reads_the_same(bag_tracks, tmp_path, mon
     assert whole['species'].to_pylist() == many['species'].to_pylist()
 
 
-def test_without_pyarrow_the_command_refuses_before_it_tracks(tmp_path, capsys, monkeypatch):
+def test_without_pyarrow_the_command_refuses_before_it_tracks(bag, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyarrow', None)
-    assert main(['track', 'no_such_bag', '-o', str(tmp_path / 'tracks.parquet')]) == 2
+    assert main(['track', str(bag), '-o', str(tmp_path / 'tracks.parquet')]) == 2
     errors = capsys.readouterr().err
     assert errors.count('\n') == 1
     assert "choose another ending, or run: pip install 'nanorocks_ros[parquet]'" in errors
