@@ -111,11 +111,11 @@ def test_tracks_elsewhere_are_refused(bag, tmp_path, capsys):
 
 def test_a_file_that_exists_is_refused_before_the_work(bag, marks, tmp_path, capsys):
     (tmp_path / 'area.yaml').write_text('mine', encoding='utf-8')
-    assert main(call('no_such_bag', marks, '-o', str(tmp_path / 'area.yaml'))) == 1
+    assert main(call(bag, marks, '-o', str(tmp_path / 'area.yaml'))) == 1
     assert 'exists already' in capsys.readouterr().err
     two = ['--trays', '1', '3', '-o', str(tmp_path / 'b.yaml')]
     (tmp_path / 'b_tray_3.yaml').write_text('mine', encoding='utf-8')
-    assert main(call('no_such_bag', marks, *two)) == 1
+    assert main(call(bag, marks, *two)) == 1
     assert 'b_tray_3.yaml: exists already' in capsys.readouterr().err
 
 
