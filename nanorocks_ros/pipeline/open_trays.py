@@ -102,7 +102,7 @@ class OpenMeasurement(ContactMeasurement):
         """The lines of `nanorocks measure`."""
         contacts = self.summary()
         lines = [
-            motion_line(self.ends, contacts, self._unit),
+            motion_line(self.ends, contacts, self._unit, self.highest),
             *contact_lines(contacts, self._unit),
         ]
         return [Notice(stamp_ns=stamp_ns, text=f'tray {self._number}: {line}') for line in lines]

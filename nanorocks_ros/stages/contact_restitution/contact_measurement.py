@@ -123,6 +123,7 @@ class ContactMeasurement(RestartingStage[TrayImage, Measurement]):
         self._known: deque[ContactOrFlight] = deque(maxlen=_MOST_CONTACTS)
         self._frames = 0
         self._ends = [math.nan, math.nan]
+        self._highest = math.nan
 
     @property
     def contacts(self) -> int:
@@ -134,6 +135,11 @@ class ContactMeasurement(RestartingStage[TrayImage, Measurement]):
         """Mean speed in the first interval, and in the last one, [m/s]."""
         first, last = self._ends
         return first, last
+
+    @property
+    def highest(self) -> float:
+        """The highest of these mean speeds, [m/s]."""
+        return float(self._highest)
 
     def summary(self) -> TrackContacts:
         """What the contacts so far say."""
@@ -246,6 +252,7 @@ class ContactMeasurement(RestartingStage[TrayImage, Measurement]):
             return ()
         mean = float(speeds.mean())
         self._ends = [self._ends[0] if math.isfinite(self._ends[0]) else mean, mean]
+        self._highest = np.fmax(self._highest, mean)
         # Velocities of a bead in neighbouring frames share their error.
         error = math.sqrt(float(np.mean(errors**2)) / beads)
         return (
