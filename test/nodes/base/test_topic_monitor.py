@@ -91,7 +91,7 @@ def test_an_incompatible_qos_is_told_while_it_lasts_and_the_advice_removes_it(gr
     graph.until(lambda: 'no data' in graph.output(process))
     (line,) = (line for line in graph.output(process).splitlines() if 'no data' in line)
     assert 'publisher offers reliability BEST_EFFORT but this node requests RELIABLE' in line
-    graph.until(lambda: statuses[-1].level == DiagnosticStatus.ERROR)
+    graph.until(lambda: bool(statuses) and statuses[-1].level == DiagnosticStatus.ERROR)
     assert statuses[-1].message in line
     graph.node.destroy_publisher(publisher)
     graph.until(lambda: statuses[-1].level == DiagnosticStatus.WARN)
