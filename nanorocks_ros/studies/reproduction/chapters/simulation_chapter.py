@@ -81,9 +81,8 @@ def simulation_chapter(context: Context) -> Chapter:
             'the paper nothing sticks here: the sticking threshold of its runs is not given.',
             Picture(
                 path=path,
-                caption='Figure 11: runs (grey), their mean (red), and the mean decay measured on '
-                'our films without sticking (green), in projection; below, the deviation of both '
-                'means (blue).',
+                caption='Figure 11: runs, their mean, and the mean decay measured on our films '
+                'without sticking, in projection; below, chi square of both means.',
             ),
             Table(
                 head=('simulated', 'chi square', 'squared relative difference'),
