@@ -59,17 +59,17 @@ class _Search:
 
     def __init__(self, scene: ContactScene, settings: PipelineSettings) -> None:
         self.scene = scene
-        self.found: list[ContactOrFlight] = []
+        self.contacts: list[ContactOrFlight] = []
         self._finder = scene.finder(settings)
         self._next = 0
 
     def goes_on(self, frames: int, *, is_end: bool = False) -> bool:
         """Search the next frames; True when there are no more."""
         for record in self.scene.tracks[self._next : self._next + frames]:
-            self.found += self._finder.push(record)
+            self.contacts += self._finder.push(record)
         self._next += frames
         if is_end:
-            self.found += self._finder.flush()
+            self.contacts += self._finder.flush()
         return self._next >= len(self.scene.tracks)
 
 
@@ -192,7 +192,7 @@ class ContactMeasurement(RestartingStage[TrayImage, Measurement]):
 
     def _finished(self, search: _Search) -> list[ContactOrFlight]:
         """Contacts and flights of a search, but for those given out before."""
-        new = self._not_given(search.found)
+        new = self._not_given(search.contacts)
         self._search = None
         corner = np.array(search.scene.corner)
         self._known.extend(new)
@@ -207,11 +207,11 @@ class ContactMeasurement(RestartingStage[TrayImage, Measurement]):
                 self._places -= self._tracks.popleft().ids.size
         return [_from_corner(result, corner) for result in new]
 
-    def _not_given(self, found: Iterable[ContactOrFlight]) -> list[ContactOrFlight]:
+    def _not_given(self, contacts: Iterable[ContactOrFlight]) -> list[ContactOrFlight]:
         """Those that have not been given out, which are remembered."""
         interval_ns = np.median(np.diff([record.stamp_ns for record in self._tracks] or [0, 0]))
         new = []
-        for result in sorted(found, key=lambda record: record.stamp_ns):
+        for result in sorted(contacts, key=lambda record: record.stamp_ns):
             if isinstance(result, self._left_out):
                 continue
             if isinstance(result, FreeFlight):

@@ -99,10 +99,10 @@ def guessed_diameter(
     for frame in frames:
         candidates = model.candidates(np.ascontiguousarray(frame))
         radii.append(candidates.outlines.discs[model.alike(candidates), 2])
-    found = _of_radii(radii)
-    if isinstance(found, str):
-        raise ConfigurationError('--diameter-px', f'cannot be guessed: {found}', 'measure a bead')
-    return found
+    size = _of_radii(radii)
+    if isinstance(size, str):
+        raise ConfigurationError('--diameter-px', f'cannot be guessed: {size}', 'measure a bead')
+    return size
 
 
 def with_found_diameters(
@@ -135,12 +135,12 @@ def with_found_diameters(
     film = _with_nominal_beads(settings, unknown, told, bag, image_topic)
     diameters, notices = {}, []
     for key in unknown:
-        found = _of_species(film, key, name)
-        diameters[key] = found.diameter / film.scale / MILLIMETRE
+        size = _of_species(film, key, name)
+        diameters[key] = size.diameter / film.scale / MILLIMETRE
         material = film.trays[key.tray].species[key.species].material
         notices.append(
             f'{name}: the diameter of {material} in tray {key.tray} is found in the film: '
-            f'{diameters[key]:.4g} mm at {film.scale:.6g} px/m, from {found}; '
+            f'{diameters[key]:.4g} mm at {film.scale:.6g} px/m, from {size}; '
             f'{DIAMETER}: {diameters[key]:.4g} keeps it'
         )
     text = with_diameters(file, diameters)
@@ -181,10 +181,10 @@ def _of_species(film: _Film, key: UnknownDiameter, name: str) -> FoundDiameter:
     detector = SceneDetector(replace(tray, species=(of_any_size,)), film.scale)
     frames = film.frames[key.tray]
     detector.learn(frames)
-    found = _of_radii([detector.detect(frame)[0].radii for frame in frames])
-    if isinstance(found, str):
-        raise ConfigurationError(where, f'its diameter cannot be found: {found}', _REMEDY)
-    return found
+    size = _of_radii([detector.detect(frame)[0].radii for frame in frames])
+    if isinstance(size, str):
+        raise ConfigurationError(where, f'its diameter cannot be found: {size}', _REMEDY)
+    return size
 
 
 def _check_can_be_found(film: _Film, tray: Tray, key: UnknownDiameter, where: str) -> None:

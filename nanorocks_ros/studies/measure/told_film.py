@@ -97,9 +97,9 @@ def sized_beads(filmed: FilmedTray, samples: FilmSamples) -> tuple[FilmedTray, s
     assert appearance is not None
     column, row, width, height = section.region_px
     crops = [frame[row : row + height, column : column + width] for frame in samples.frames]
-    found = guessed_diameter(crops, BeadLook(sign=appearance.sign, colour=appearance.colour))
-    return _of_size(filmed, round(found.diameter, 2)), (
-        f'the diameter is guessed: {found}; --diameter-px sets it'
+    size = guessed_diameter(crops, BeadLook(sign=appearance.sign, colour=appearance.colour))
+    return _of_size(filmed, round(size.diameter, 2)), (
+        f'the diameter is guessed: {size}; --diameter-px sets it'
     )
 
 

@@ -51,10 +51,10 @@ def discs(tmp_path_factory):
 
 @pytest.mark.parametrize('colour', [DARK, BRIGHT, RED])
 def test_the_diameter_of_discs_of_any_look_is_guessed(colour):
-    found = guessed_diameter(disc_frames([colour]))
-    assert found.diameter == pytest.approx(20.0, rel=0.06)
-    assert found.spread < 0.1
-    assert found.discs > found.frames
+    size = guessed_diameter(disc_frames([colour]))
+    assert size.diameter == pytest.approx(20.0, rel=0.06)
+    assert size.spread < 0.1
+    assert size.discs > size.frames
 
 
 def test_an_empty_film_is_refused():
@@ -65,10 +65,10 @@ def test_an_empty_film_is_refused():
 
 def test_the_size_is_found_with_the_scale_of_the_file_and_said(discs, tmp_path):
     path = trays_file(tmp_path, 'colour: red, diameter_mm: auto')
-    found = with_found_diameters(PipelineSettings(trays_file=str(path)), {'trays_file'}, discs)
-    (species,) = load_trays(found.settings.trays_file)[1].species
+    recorded = with_found_diameters(PipelineSettings(trays_file=str(path)), {'trays_file'}, discs)
+    (species,) = load_trays(recorded.settings.trays_file)[1].species
     assert species.diameter == pytest.approx(20.0 / SCALE, rel=0.06)
-    (notice,) = found.notices
+    (notice,) = recorded.notices
     assert f'diameter_mm: {1e3 * species.diameter:.4g} keeps it' in notice
 
 
@@ -81,8 +81,8 @@ def test_a_told_scale_counts_where_the_file_has_none(discs, tmp_path):
         preprocess=PreprocessSettings(pixels_per_metre=2.0 * SCALE, regions_px=(0, 0, *SIZE)),
     )
     told = {'trays_file', 'trays', 'preprocess.pixels_per_metre', 'preprocess.regions_px'}
-    found = with_found_diameters(settings, told, discs)
-    (species,) = load_trays(found.settings.trays_file)[1].species
+    recorded = with_found_diameters(settings, told, discs)
+    (species,) = load_trays(recorded.settings.trays_file)[1].species
     assert species.diameter == pytest.approx(10.0 / SCALE, rel=0.06)
 
 
