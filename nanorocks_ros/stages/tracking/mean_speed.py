@@ -96,7 +96,7 @@ class MeanSpeed:
 
     @property
     def share_of_visible(self) -> float:
-        """Share of the beads that do not lie under others."""
+        """Share of those beads that do not lie under others which have tracks."""
         return self.share / (1.0 - self.hidden)
 
 
