@@ -49,10 +49,30 @@ def _constants(holder: Any) -> _Constants:
     return _Constants(holder.env_name, holder.globals['__name__'], list(holder.consts))
 
 
+class _Code(NamedTuple):
+    """Code of a function and of all that it calls."""
+
+    name: str
+    machine_code: bytes
+    bitcode: bytes
+
+
+def _code_of(library: Any) -> _Code:
+    """The code of a library, whose functions may be linked into several others.
+
+    numba copies the intermediate code before it says so; but it is translated already.
+    """
+    module = library._final_module
+    for function in module.functions:
+        if not function.is_declaration and function.linkage == binding.Linkage.external:
+            function.linkage = 'linkonce_odr'
+    return _Code(library.name, library._get_compiled_object(), module.as_bitcode())
+
+
 class _Kept(NamedTuple):
     """A compiled version of a function, as kept on disk."""
 
-    library: tuple[str, str, tuple[bytes, bytes]]
+    library: _Code
     description: Any
     constants: _Constants
     signature: Any
@@ -64,13 +84,13 @@ class _LoadedLibrary(codegen.JITCodeLibrary):
     """Machine code of a function, and its intermediate code, not parsed yet."""
 
     def __init__(self, owner: Any, kept: _Kept) -> None:
-        name, _, (machine_code, self._bitcode) = kept.library
-        _new_library(self, owner, name)
+        _new_library(self, owner, kept.library.name)
+        self._bitcode = kept.library.bitcode
         self._linking_libraries: list[Any] = []
         self._shared_module: Any = None
         self._disable_inspection = self._finalized = True
         engine = owner._engine
-        engine._ee.add_object_file(binding.ObjectFileRef.from_data(machine_code))
+        engine._ee.add_object_file(binding.ObjectFileRef.from_data(kept.library.machine_code))
         described = kept.description
         engine._defined_symbols |= {described.llvm_func_name, described.llvm_cpython_wrapper_name}
         engine.finalize_object()
@@ -92,7 +112,7 @@ class _Format(caching.CompileResultCacheImpl):
         # numba leaves them out as well: they are not needed any more, and may not be picklable.
         described.typemap = described.calltypes = None
         return _Kept(
-            library=result.library.serialize_using_object_code(),
+            library=_code_of(result.library),
             description=described,
             constants=_constants(result.environment),
             signature=result.signature,
