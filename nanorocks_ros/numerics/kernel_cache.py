@@ -77,8 +77,9 @@ class SharedCache:
             from numba.core.caching import NullCache
 
             self._dispatcher._cache = NullCache()
-            # numba does not cache if neither the package nor the home is writable.
-            with suppress(RuntimeError):
+            # numba does not cache if neither the package nor the home is writable; one that keeps
+            # its cache in another way keeps it where it wants to.
+            with suppress(RuntimeError, AttributeError):
                 self._enable(self._dispatcher)
                 _share(self._dispatcher, self._module, self._code)
         return self._dispatcher._cache
