@@ -28,8 +28,8 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-nodes test-oldest test-oldest-meanwhile dependencies-oldest test-package golden lint bench docs docs-pages site venv \
-        messages lock clean
+.PHONY: help demo test test-nodes test-oldest test-oldest-meanwhile dependencies-oldest \
+        test-package golden lint bench docs docs-pages site venv messages lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -74,6 +74,8 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/studies/figures/test_demo_figure.py test/studies/inspection \
         test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
         test/cli/test_interrupts.py
+
+# Beside `make venv`, see .ci/run.
 dependencies-oldest:
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt own dependencies
 
