@@ -60,9 +60,9 @@ test-oldest-meanwhile:
 	    cat build/test_oldest.log; exit $$status
 
 # What takes minutes and only goes through, once more, what other tests go through (or compares a
-# picture, which another Matplotlib letters in another way): analyses of
-# whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
-# all dependencies, and one command of it is enough.
+# picture, which another Matplotlib letters in another way; or reads texts of the repository alone):
+# analyses of whole bags go through all stages and the inference. The simulation is the same, bit
+# by bit, with all dependencies, and one command of it is enough.
 ONCE := test/golden test/validation test/simulation test/inference test/stages test/pipeline \
         test/dashboard/test_page.py test/physics/test_confined_theory.py \
         test/studies/reproduction test/studies/batch test/studies/calibration \
@@ -73,7 +73,8 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/cli/films test/studies/gas_statistics test/tools/docs_pages \
         test/studies/figures/test_demo_figure.py test/studies/inspection \
         test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
-        test/cli/test_interrupts.py
+        test/cli/test_interrupts.py test/test_docs.py test/test_external_links.py \
+        test/test_mirror.py test/test_validation_tables.py
 
 # Beside `make venv`, see .ci/run.
 dependencies-oldest:
