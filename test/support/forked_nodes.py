@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 from multiprocessing import resource_tracker
+from pathlib import Path
 
 from nanorocks_ros.nodes.run import NODES
 
@@ -25,6 +26,8 @@ class ForkedNode:
     def __init__(self, arguments, environment, log):
         # Read when the library is loaded.
         os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+        # Tests read it before the node has begun.
+        Path(log).touch()
         self._process = _FORKS.Process(
             target=_run, args=(arguments, environment, os.getcwd(), log), daemon=False
         )
