@@ -45,6 +45,7 @@ def imported_modules(path: Path) -> frozenset[Path]:
     return frozenset(module for module in modules if module.is_file())
 
 
+@cache
 def reached_modules(path: Path) -> set[Path]:
     """Modules of the package that are loaded when a file is run."""
     reached: set[Path] = set()
