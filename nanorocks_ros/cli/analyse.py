@@ -105,8 +105,11 @@ def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
-    from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
-    from nanorocks_ros.studies.analysis.results_json import as_json
+    from nanorocks_ros.studies.analysis.results.results_folder import (
+        check_results_folder,
+        write_results,
+    )
+    from nanorocks_ros.studies.analysis.results.results_json import as_json
 
     source = Path(options.bags[0])
     folder = Path(options.output or f'{_stem(Path(options.named[0]))}_results')
@@ -161,7 +164,7 @@ def _scratch_folder() -> Path | None:
 
 
 def _print(analysis: Analysis, options: argparse.Namespace) -> None:
-    from nanorocks_ros.studies.analysis.tray_words import tray_lines
+    from nanorocks_ros.studies.analysis.results.tray_words import tray_lines
 
     lost = f', {analysis.frames_lost} lost' if analysis.frames_lost else ''
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')

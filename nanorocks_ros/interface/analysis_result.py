@@ -22,19 +22,19 @@ from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.records import CorEstimate, headline_in_words
 from nanorocks_ros.records.result_words import reason_of
-from nanorocks_ros.studies.analysis.cycle_words import (
+from nanorocks_ros.studies.analysis.results.cycle_words import (
     cycle_as_json,
     tray_reason,
     used_speeds,
     wall_prior,
 )
-from nanorocks_ros.studies.analysis.results_folder import FORMATS, write_results
-from nanorocks_ros.studies.analysis.results_json import (
+from nanorocks_ros.studies.analysis.results.results_folder import FORMATS, write_results
+from nanorocks_ros.studies.analysis.results.results_json import (
     end_of_cycle,
     ends_of_cycles,
     last_of_each_cycle,
 )
-from nanorocks_ros.studies.analysis.tracks_files import columns_of, track_pieces
+from nanorocks_ros.studies.analysis.results.tracks_files import columns_of, track_pieces
 from nanorocks_ros.studies.results.contact_columns import CONTACT_COLUMNS, contact_arrays
 from nanorocks_ros.wire.products import MEASURED
 

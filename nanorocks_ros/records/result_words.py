@@ -3,7 +3,7 @@
 The terminal, the JSON of `nanorocks analyse`, reports and the live page take their words from
 here.
 
-Tested by ``test/studies/analysis/test_cycle_words.py``.
+Tested by ``test/studies/analysis/results/test_cycle_words.py``.
 """
 
 from __future__ import annotations

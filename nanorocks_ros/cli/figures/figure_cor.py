@@ -161,7 +161,10 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
     """Analyse a bag into a folder beside the figures."""
     from nanorocks_ros.cli.progress import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
-    from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
+    from nanorocks_ros.studies.analysis.results.results_folder import (
+        check_results_folder,
+        write_results,
+    )
 
     scratch = check_results_folder(folder)
     with Progress('analysing') as progress:
@@ -174,7 +177,7 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
 
 def _data(options: argparse.Namespace, source: Path) -> CorData:
     from nanorocks_ros.experiment.trays import tray_by_number
-    from nanorocks_ros.studies.analysis.published_cycles import (
+    from nanorocks_ros.studies.analysis.results.published_cycles import (
         published_cycles,
         published_lines,
         truth_of,

@@ -25,7 +25,7 @@ from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.stages.clusters.correlation_width import correlated_with_shadows
 from nanorocks_ros.stages.clusters.packing_density import packing_of_clusters
 from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

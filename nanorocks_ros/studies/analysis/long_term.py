@@ -24,7 +24,7 @@ from nanorocks_ros.studies.analysis.cycle_summaries import (
     cycles_of,
     size_measure,
 )
-from nanorocks_ros.studies.analysis.result_tables import trays_of
+from nanorocks_ros.studies.analysis.results.result_tables import trays_of
 from nanorocks_ros.studies.results.record_columns import columns_of
 from nanorocks_ros.studies.results.run_provenance import run_provenance
 

@@ -24,7 +24,7 @@ from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
-from nanorocks_ros.studies.analysis.results_folder import SUMMARY
+from nanorocks_ros.studies.analysis.results.results_folder import SUMMARY
 from nanorocks_ros.studies.batch.batch_task import (
     DONE,
     PARTIAL,

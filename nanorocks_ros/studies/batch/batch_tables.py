@@ -12,7 +12,7 @@ import numpy as np
 from nanorocks_ros.outputs.table_columns import JOINED, Column
 from nanorocks_ros.outputs.table_files import write_package, write_table
 from nanorocks_ros.records import ClusterEstimate, CorEstimate
-from nanorocks_ros.studies.analysis.results_json import BY_SOURCE
+from nanorocks_ros.studies.analysis.results.results_json import BY_SOURCE
 from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined, means_as_json
 from nanorocks_ros.studies.results.record_columns import GOOD, columns_of
 

@@ -28,7 +28,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.records.result_words import fitted
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary
 from nanorocks_ros.studies.analysis.long_term import Campaign, campaign_of
-from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
+from nanorocks_ros.studies.analysis.results.results_folder import EVIDENCE
 from nanorocks_ros.studies.batch.batch_trays import of_these_trays, settings_by_tray
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.table_files import write_package, write_table
 from nanorocks_ros.outputs.unfinished_files import holds_files
-from nanorocks_ros.studies.analysis.tracks_files import columns_of
+from nanorocks_ros.studies.analysis.results.tracks_files import columns_of
 from nanorocks_ros.studies.measure.measure_tables import tray_tables
 from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ
 from nanorocks_ros.studies.results.results_provenance import provenance_of, read_provenance

@@ -20,7 +20,7 @@ from nanorocks_ros.recordings.messages.message_builders import image_message, ti
 from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.studies.analysis.bag_tracks import track_bag
-from nanorocks_ros.studies.analysis.tracks_files import COLUMNS, write_tracks
+from nanorocks_ros.studies.analysis.results.tracks_files import COLUMNS, write_tracks
 from nanorocks_ros.studies.inspection.track_overlay import overlay
 from nanorocks_ros.studies.synthetic.film_bag import film_into_bag
 from nanorocks_ros.wire import topics

@@ -20,7 +20,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
 from nanorocks_ros.studies.decays.cooling_curves import (
     check_errors,
     cooling_part,

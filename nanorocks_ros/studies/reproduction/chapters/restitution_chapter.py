@@ -29,7 +29,7 @@ from nanorocks_ros.physics.paper_formulas import (
     paper_wall_ellipse,
 )
 from nanorocks_ros.settings import PriorSettings
-from nanorocks_ros.studies.analysis.contact_tables import contacts_of_results
+from nanorocks_ros.studies.analysis.results.contact_tables import contacts_of_results
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
 from nanorocks_ros.studies.decays.cooling_windows import cooling_window
 from nanorocks_ros.studies.figures.cor_figures import (

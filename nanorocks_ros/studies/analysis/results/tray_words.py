@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import CorRelation
 from nanorocks_ros.settings import priors_in_words
-from nanorocks_ros.studies.analysis.cycle_words import (
+from nanorocks_ros.studies.analysis.results.cycle_words import (
     cycle_lines,
     is_decay_left_out,
     tray_reason,
     used_speeds,
     wall_prior,
 )
-from nanorocks_ros.studies.analysis.results_json import (
+from nanorocks_ros.studies.analysis.results.results_json import (
     end_of_cycle,
     ends_of_cycles,
     last_of_each_cycle,

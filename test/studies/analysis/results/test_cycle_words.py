@@ -22,7 +22,8 @@ from nanorocks_ros.records import (
     StickingStatus,
 )
 from nanorocks_ros.records.result_words import FLAGS, WallPrior, flags_in_words, reason_of
-from nanorocks_ros.studies.analysis.cycle_words import (
+from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
+from nanorocks_ros.studies.analysis.results.cycle_words import (
     UsedSpeeds,
     cycle_as_json,
     cycle_lines,
@@ -30,8 +31,7 @@ from nanorocks_ros.studies.analysis.cycle_words import (
     tray_reason,
     used_speeds,
 )
-from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_json import as_json
+from nanorocks_ros.studies.analysis.results.results_json import as_json
 
 NS = 1_000_000_000
 NOTHING_WRONG = Quality(0)

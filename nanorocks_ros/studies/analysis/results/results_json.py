@@ -1,6 +1,6 @@
 """Results of an analysis as a JSON object.
 
-Tested by ``test/studies/analysis/test_results_folder.py``.
+Tested by ``test/studies/analysis/results/test_results_folder.py``.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.json_values import finite_or_none
 from nanorocks_ros.records import NS, ClusterEstimate, CorEstimate, CorStatus
-from nanorocks_ros.studies.analysis.cycle_words import (
+from nanorocks_ros.studies.analysis.recognition_verdicts import verdict_as_json
+from nanorocks_ros.studies.analysis.results.cycle_words import (
     cycle_as_json,
     is_decay_left_out,
     tray_reason,
     used_speeds,
     wall_prior,
 )
-from nanorocks_ros.studies.analysis.recognition_verdicts import verdict_as_json
 from nanorocks_ros.wire.array_layouts import layout
 from nanorocks_ros.wire.flat_records import flat_value
 

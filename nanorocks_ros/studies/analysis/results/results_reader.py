@@ -13,7 +13,7 @@ from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
 from nanorocks_ros.outputs.npz_archive import read_archive
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import EVIDENCE
+from nanorocks_ros.studies.analysis.results.results_folder import EVIDENCE
 from nanorocks_ros.studies.results.results_provenance import BAG_NAME, read_provenance
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array

@@ -28,12 +28,12 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import (
+from nanorocks_ros.studies.analysis.results.results_folder import (
     FORMATS,
     check_results_folder,
     write_results,
 )
-from nanorocks_ros.studies.analysis.results_json import as_json, last_of_each_cycle
+from nanorocks_ros.studies.analysis.results.results_json import as_json, last_of_each_cycle
 from nanorocks_ros.studies.results.record_columns import columns_of
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array, layout

@@ -16,9 +16,9 @@ from nanorocks_ros.outputs.html_report import number, with_interval
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.records import CorEstimate, CorRelation, Headline, headline_in_words
 from nanorocks_ros.records.result_words import RELATIONS, flags_in_words, reason_of
-from nanorocks_ros.studies.analysis.result_tables import read_columns
-from nanorocks_ros.studies.analysis.results_folder import truth_keys
-from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.results_folder import truth_keys
+from nanorocks_ros.studies.analysis.results.results_json import last_of_each_cycle
 from nanorocks_ros.studies.results.results_provenance import BAG_NAME
 from nanorocks_ros.wire.array_layouts import from_array, layout
 
