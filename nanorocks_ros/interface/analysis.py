@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.interface.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.interface.inputs import named_paths, recording, settings_of, told_settings
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
+from nanorocks_ros.interface.results.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.interface.result import Result, Summary, run_words
+from nanorocks_ros.interface.results.result import Result, Summary, run_words
 from nanorocks_ros.outputs.safe_text import counted
 
 if TYPE_CHECKING:

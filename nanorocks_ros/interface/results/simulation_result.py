@@ -12,7 +12,7 @@ import pandas as pd
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.interface.record_frames import table_frame
-from nanorocks_ros.interface.result import Result, Summary
+from nanorocks_ros.interface.results.result import Result, Summary
 from nanorocks_ros.outputs.html_report import number
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.synthetic.trajectory import event_table, trajectory_table

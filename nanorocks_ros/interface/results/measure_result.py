@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import joined
-from nanorocks_ros.interface.result import Result, Summary, run_words
+from nanorocks_ros.interface.results.result import Result, Summary, run_words
 from nanorocks_ros.interface.table_reading import read_frame
 from nanorocks_ros.outputs.html_report import with_interval
 from nanorocks_ros.studies.measure.measure_tables import CONTACTS, MEAN_SPEEDS, RESTITUTIONS
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from nanorocks_ros.interface.analysis_result import AnalysisResult
+    from nanorocks_ros.interface.results.analysis_result import AnalysisResult
 
 # What a line says of a restitution that is not known.
 _UNKNOWN = re.compile('no restitution|not determined')
@@ -80,7 +80,7 @@ class MeasureResult(Result):
         """Cycles, by the decay of the speeds and contacts together; None where not read."""
         if not self._measured.decay_read:
             return None
-        from nanorocks_ros.interface.analysis_reading import analysis_of
+        from nanorocks_ros.interface.results.analysis_reading import analysis_of
 
         return analysis_of(self.folder)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.interface.analysis_result import AnalysedRecording, AnalysisResult
+from nanorocks_ros.interface.results.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 from nanorocks_ros.recordings.film.natural_sort import natural_key
 from nanorocks_ros.studies.analysis.results.results_reader import read_analysis

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.interface.combined_cycles import combined_frame
 from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import frame_of, joined, table_frame, with_column
-from nanorocks_ros.interface.result import Result, Summary, run_words
+from nanorocks_ros.interface.results.combined_cycles import combined_frame
+from nanorocks_ros.interface.results.result import Result, Summary, run_words
 from nanorocks_ros.outputs.html_report import with_interval
 from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.outputs.safe_text import counted
@@ -239,7 +239,7 @@ class AnalysisResult(Result):
         return self._joined(tracks)
 
     def _figure(self) -> Figure:
-        from nanorocks_ros.interface.campaign_figure import campaign_figure
+        from nanorocks_ros.interface.results.campaign_figure import campaign_figure
 
         return campaign_figure(self.speeds, self.cor, self.combined)
 
