@@ -78,7 +78,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Analyse one bag or many, print and write the results, and return the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
-    from nanorocks_ros.outputs.parquet import check_parquet
+    from nanorocks_ros.outputs.tables.parquet import check_parquet
 
     # Checked before hours of work.
     check_parquet(Path(f'tables.{options.format}'))

@@ -11,8 +11,8 @@ from videos import write_video
 
 from nanorocks_ros.cli.film_inputs import use_imports
 from nanorocks_ros.cli.main import build_parser, main
-from nanorocks_ros.outputs.table_columns import float_columns
-from nanorocks_ros.outputs.table_files import write_package
+from nanorocks_ros.outputs.tables.table_columns import float_columns
+from nanorocks_ros.outputs.tables.table_files import write_package
 from nanorocks_ros.studies.film_import.film_cache import is_film
 
 COLUMNS = float_columns(('time', 'x'), ('s', 'm'))

@@ -90,8 +90,8 @@ def tracked_bag(options: argparse.Namespace) -> TrackedBag:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.outputs.parquet import check_parquet
     from nanorocks_ros.outputs.photographs import PHOTOGRAPHS
+    from nanorocks_ros.outputs.tables.parquet import check_parquet
     from nanorocks_ros.studies.analysis.results.tracks_files import TABLES
 
     names = {'--output': options.output, '--picture': options.picture}

@@ -14,14 +14,14 @@ from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.parameter import Parameter
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
+from nanorocks_ros.nodes.base.communication.qos_overrides import (
+    refuse_invalid_overrides,
+    refuse_overrides_of_unknown_topics,
+)
 from nanorocks_ros.nodes.base.parameter_checks import (
     command_line_parameters,
     require_string,
     unknown_parameters,
-)
-from nanorocks_ros.nodes.base.qos_overrides import (
-    refuse_invalid_overrides,
-    refuse_overrides_of_unknown_topics,
 )
 from nanorocks_ros.settings import coerced, problem, rows, with_current_names, with_values
 

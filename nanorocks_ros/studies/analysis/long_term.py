@@ -15,8 +15,8 @@ from nanorocks_ros.inference.trend_tests import (
     quiet_periods,
     robust_trend,
 )
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import write_rows
 from nanorocks_ros.records import CorEstimate
 from nanorocks_ros.studies.analysis.cycle_summaries import (
     CycleSummary,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.outputs.table_columns import JOINED, Column
-from nanorocks_ros.outputs.table_files import write_package, write_table
+from nanorocks_ros.outputs.tables.table_columns import JOINED, Column
+from nanorocks_ros.outputs.tables.table_files import write_package, write_table
 from nanorocks_ros.records import ClusterEstimate, CorEstimate
 from nanorocks_ros.studies.analysis.results.results_json import BY_SOURCE
 from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined, means_as_json
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Kind
+    from nanorocks_ros.outputs.tables.table_columns import Kind
 
 CYCLES, TRAYS = 'cycles', 'trays'
 _OF_COR = {column.name: column for column in columns_of(CorEstimate)}

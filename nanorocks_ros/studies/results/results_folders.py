@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.json_values import read_object
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 
 if TYPE_CHECKING:

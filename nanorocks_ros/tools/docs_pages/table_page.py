@@ -30,7 +30,7 @@ from nanorocks_ros.wire.products import MEASURED
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
 
 _INTRODUCTION = """\
 <!-- Made by `make docs` from the code; change that instead. -->

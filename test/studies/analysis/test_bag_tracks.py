@@ -13,7 +13,7 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.outputs import parquet as parquet_files
+from nanorocks_ros.outputs.tables import parquet as parquet_files
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message

@@ -14,7 +14,7 @@ from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
 from nanorocks_ros.inference.flights.flight_losses import flight_losses, flight_table
-from nanorocks_ros.outputs.csv_tables import number, read_csv
+from nanorocks_ros.outputs.tables.csv_tables import number, read_csv
 from nanorocks_ros.records import NS, CorStatus, FreeFlight, Measured, PairCollision, Rebound
 from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 from nanorocks_ros.wire.array_layouts import from_array

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.csv_tables import csv_rows
+from nanorocks_ros.outputs.tables.csv_tables import csv_rows
 from nanorocks_ros.studies.results.record_columns import number_of
 
 if TYPE_CHECKING:

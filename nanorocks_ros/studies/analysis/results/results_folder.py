@@ -17,7 +17,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
 from nanorocks_ros.outputs.atomic_files import check_new_folder
-from nanorocks_ros.outputs.table_files import PACKAGE, write_package, write_table
+from nanorocks_ros.outputs.tables.table_files import PACKAGE, write_package, write_table
 from nanorocks_ros.outputs.unfinished_files import (
     delete_unfinished_folders,
     exchange_folder,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.experiment.trays import tray_values
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_table
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import write_table
 from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:

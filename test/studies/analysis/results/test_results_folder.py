@@ -14,8 +14,8 @@ import pytest
 
 from benchmarks.file_steps import kill_at_each_step, run_until, was_killed
 from nanorocks_ros.errors import RecordingError, UnwritableError
-from nanorocks_ros.outputs.csv_tables import number
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.csv_tables import number
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.records import (
     CorEstimate,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from std_msgs.msg import Header
 
-from nanorocks_ros.nodes.base.ros_messages import message_class, time_message
+from nanorocks_ros.nodes.base.communication.ros_messages import message_class, time_message
 from nanorocks_ros.wire.array_layouts import enumerated, field_value, layout
 from nanorocks_ros.wire.products import TYPED_TOPICS
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import ROSClock
 
+from nanorocks_ros.nodes.base.communication.qos_compatibility import mismatches
+from nanorocks_ros.nodes.base.communication.ros_messages import node_name_of
 from nanorocks_ros.nodes.base.problems import NO_PUBLISHER, Level, Problem
-from nanorocks_ros.nodes.base.qos_compatibility import mismatches
-from nanorocks_ros.nodes.base.ros_messages import node_name_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.nodes.base.qos_overrides import (
+from nanorocks_ros.nodes.base.communication.qos_overrides import (
     refuse_invalid_overrides,
     refuse_overrides_of_unknown_topics,
 )

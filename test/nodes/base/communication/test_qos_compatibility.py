@@ -8,7 +8,7 @@ pytest.importorskip('rclpy')
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from nanorocks_ros.nodes.base.qos_compatibility import mismatches
+from nanorocks_ros.nodes.base.communication.qos_compatibility import mismatches
 
 
 def test_every_policy_that_does_not_match_is_named():

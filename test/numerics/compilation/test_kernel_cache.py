@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from nanorocks_ros.numerics.kernel_cache import cache_root, code_key
+from nanorocks_ros.numerics.compilation.kernel_cache import cache_root, code_key
 
 
 def test_the_folder_is_that_of_numba_where_it_is_told_or_of_the_user(monkeypatch, tmp_path):

@@ -19,12 +19,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from nanorocks_ros.numerics.compile_lock import compile_once
+from nanorocks_ros.numerics.compilation.compile_lock import compile_once
 
 # Imports at the left margin; those for the type checker alone are indented and not compiled.
 _IMPORT = re.compile(rb'^(?:from|import) ([\w.]+)', re.MULTILINE)
 # How functions are compiled; imported by a function, and not where numba compiles in its own way.
-_COMPILER = 'nanorocks_ros.numerics.lean_compilation'
+_COMPILER = 'nanorocks_ros.numerics.compilation.lean_compilation'
 _DAY_S = 86_400.0
 # Folders of code that was not used for so long are removed, [s].
 _UNUSED_S = 30.0 * _DAY_S

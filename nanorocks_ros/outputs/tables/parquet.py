@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
 
 # Rows written together, at least, unless there are no more.
 _GROUP_ROWS = 1 << 16

@@ -23,7 +23,7 @@ from numba.core import codegen, compiler, dispatcher, event, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.typing import templates
 
-from nanorocks_ros.numerics.early_passes import has_loops, simplify
+from nanorocks_ros.numerics.compilation.early_passes import has_loops, simplify
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

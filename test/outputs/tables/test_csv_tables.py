@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.outputs.csv_tables import number, read_csv, write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import number, read_csv, write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 
 COLUMNS = float_columns(('time', 'mean_projected_speed'), ('s', 'm/s'))
 

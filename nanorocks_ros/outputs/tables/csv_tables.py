@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
 
 _TRUTH = {'true': 1.0, 'false': 0.0}
 

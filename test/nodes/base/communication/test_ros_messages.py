@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
 
 from nanorocks_ros.experiment.lens import Camera
-from nanorocks_ros.nodes.base.ros_messages import (
+from nanorocks_ros.nodes.base.communication.ros_messages import (
     array_message,
     camera_info_message,
     compressed_message,

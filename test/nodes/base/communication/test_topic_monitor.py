@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 
-from nanorocks_ros.nodes.base.topic_monitor import TopicMonitor
+from nanorocks_ros.nodes.base.communication.topic_monitor import TopicMonitor
 from nanorocks_ros.wire import topics
 
 

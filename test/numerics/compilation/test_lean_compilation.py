@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numba.core import event
 
-from nanorocks_ros.numerics.lean_compilation import COMPILED, compile_lean
+from nanorocks_ros.numerics.compilation.lean_compilation import COMPILED, compile_lean
 
 
 def lean(function):

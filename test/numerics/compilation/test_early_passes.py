@@ -6,7 +6,7 @@ import pytest
 from llvmlite import binding
 from numba.core.registry import cpu_target
 
-from nanorocks_ros.numerics.early_passes import has_loops, simplify
+from nanorocks_ros.numerics.compilation.early_passes import has_loops, simplify
 
 # An argument that is stored and loaded, as numba does with every variable.
 IN_MEMORY = """

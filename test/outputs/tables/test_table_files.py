@@ -9,8 +9,8 @@ import re
 import numpy as np
 import pytest
 
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import (
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import (
     PACKAGE,
     write_package,
     write_rows,

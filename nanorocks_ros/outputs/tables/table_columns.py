@@ -1,6 +1,6 @@
 """A column of a table, in every form that tables are written in.
 
-Tested by ``test/outputs/test_csv_tables.py``.
+Tested by ``test/outputs/tables/test_csv_tables.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ table ``tracks.csv`` stands beside it in ``tracks.csv.json``, that of the tables
 ``datapackage.json``. `unit` and `provenance` are additions, which these standards allow. Parquet
 files hold units, meanings and provenance themselves.
 
-Tested by ``test/outputs/test_table_files.py``.
+Tested by ``test/outputs/tables/test_table_files.py``.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.outputs.csv_tables import rows_of, write_csv
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.outputs.parquet import write_parquet
-from nanorocks_ros.outputs.table_columns import JOINED
+from nanorocks_ros.outputs.tables.csv_tables import rows_of, write_csv
+from nanorocks_ros.outputs.tables.parquet import write_parquet
+from nanorocks_ros.outputs.tables.table_columns import JOINED
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
 
 PACKAGE = 'datapackage.json'
 """Describes the tables of a folder."""
