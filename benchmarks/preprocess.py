@@ -26,9 +26,9 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
 from nanorocks_ros.stages.preprocess.plate_search import guess_plate
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.rectify import mix_weights, nodes_of, resample_color
 from nanorocks_ros.stages.preprocess.shaking.shake_detection import MotionMeter
 from nanorocks_ros.stages.preprocess.stabilise import TrayRegistration

@@ -41,8 +41,8 @@ Examples:
 def add_parser(commands: Any) -> None:
     """Add the command."""
     from nanorocks_ros.cli.analyse_batch import add_options
-    from nanorocks_ros.cli.film_inputs import accept_films
     from nanorocks_ros.cli.flags import add_bag
+    from nanorocks_ros.cli.imported_films import accept_films
 
     parser = commands.add_parser(
         'analyse',
@@ -102,7 +102,7 @@ def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
 
 def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
     from nanorocks_ros.studies.analysis.results.results_folder import (

@@ -14,7 +14,7 @@ from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up
 from nanorocks_ros.settings import CameraSettings, PipelineSettings
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:

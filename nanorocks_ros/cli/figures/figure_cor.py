@@ -82,7 +82,7 @@ def add_parser(kinds: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read or analyse, search, draw and print, and return the exit code."""
-    from nanorocks_ros.cli.progress import RunProgress
+    from nanorocks_ros.cli.progress_bar import RunProgress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.figures.cor_figures import Reports, cor_figures, prepare_folder
 
@@ -159,7 +159,7 @@ def _settings(options: argparse.Namespace, bag: Path) -> PipelineSettings:
 
 def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
     """Analyse a bag into a folder beside the figures."""
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.results.results_folder import (
         check_results_folder,

@@ -109,7 +109,7 @@ def _read_curves(
 def _simulate_curves(
     options: argparse.Namespace, trays: dict[int, Tray]
 ) -> dict[int, Sequence[PackingCurve]]:
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.settings import SimulationSettings
     from nanorocks_ros.studies.analysis.cluster_packing import simulated_packing
 

@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
 def tracked_bag(options: argparse.Namespace) -> TrackedBag:
     """Track the beads of the bag of the options, with progress; print what is to be known."""
     from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.parsing.tray_options import add_trays_file
-from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings
 

@@ -24,7 +24,7 @@ from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.stages.clusters.correlation_width import correlated_with_shadows
 from nanorocks_ros.stages.clusters.packing_density import packing_of_clusters
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 
 if TYPE_CHECKING:

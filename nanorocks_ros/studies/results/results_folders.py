@@ -1,6 +1,6 @@
 """Folders of results where a film or a recording is wanted: their pictures are no film.
 
-Tested by ``test/cli/test_film_inputs.py``.
+Tested by ``test/cli/test_imported_films.py``.
 """
 
 from __future__ import annotations

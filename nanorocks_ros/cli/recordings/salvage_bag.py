@@ -26,7 +26,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Salvage the bag and print the result; returns the exit code."""
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.outputs.safe_text import printable
     from nanorocks_ros.recordings.bag.salvage import salvage

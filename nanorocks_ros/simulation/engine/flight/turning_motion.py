@@ -6,7 +6,7 @@ time, see `rotation_series`. Where every bead is follows from it: the shape of a
 changes. Whether bodies turn is in the type of the state; where they do not, the compiler leaves
 this module out.
 
-Tested by ``test/simulation/engine/flight/test_rigid_motion.py``.
+Tested by ``test/simulation/engine/flight/test_turning_motion.py``.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _MM = 1e3
 
 
-def area_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
+def area_calibration_figure(path: Path, fits: Mapping[int, AreaFit]) -> None:
     """Draw the speed pairs of each tray, and the fitted line.
 
     Parameters

@@ -9,7 +9,7 @@ from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.records import Frame, Notice, TrayImage
 from nanorocks_ros.settings import PipelineSettings, with_values
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 NS = 1_000_000_000
 

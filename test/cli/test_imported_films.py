@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from videos import write_video
 
-from nanorocks_ros.cli.film_inputs import use_imports
+from nanorocks_ros.cli.imported_films import use_imports
 from nanorocks_ros.cli.main import build_parser, main
 from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.outputs.tables.table_files import write_package

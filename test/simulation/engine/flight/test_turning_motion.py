@@ -11,7 +11,7 @@ from stepped_bodies import SteppedBodies
 from turning_bodies import MERGING, rod, spin_of_rod
 
 from nanorocks_ros.simulation.engine import vectors
-from nanorocks_ros.simulation.engine.flight.rigid_motion import FROM, UNTIL, rotated
+from nanorocks_ros.simulation.engine.flight.turning_motion import FROM, UNTIL, rotated
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.kernel_choice import Kernel
 from nanorocks_ros.simulation.engine.rules.collision_rules import CollisionRules

@@ -61,7 +61,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Film, measure, write and print, and return the exit code."""
     from nanorocks_ros.cli.calibration.finished_output import is_finished
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.inference.cluster_size.cluster_curve import curve_key, load_curves
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs

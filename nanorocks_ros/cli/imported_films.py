@@ -87,7 +87,7 @@ def _recording(name: str) -> str:
     """The import of a film, with a line that says so; other names as they are."""
     if not _is_film(name):
         return name
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.outputs.safe_text import printable
     from nanorocks_ros.studies.film_import.film_cache import cached_import
 

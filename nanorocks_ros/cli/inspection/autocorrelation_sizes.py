@@ -42,7 +42,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Measure cluster sizes, write and print them, and return the exit code."""
     from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.inspection.autocorrelations import cycle_clusters, write_clusters
