@@ -49,8 +49,8 @@ def analyse(
     trays_file : path, optional
         YAML file of trays other than those that flew.
     settings : mapping, optional
-        Settings by their names, such as ``{'cooling.duration': 15}``; see
-        docs/reference/parameters.md.
+        Settings by their names, such as ``{'cooling.duration': 15}``;
+        ``nanorocks analyse --help-all`` lists them.
     image_topic : str, optional
         The camera's topic if it has another name than that of our nodes.
     keep_tracks : bool

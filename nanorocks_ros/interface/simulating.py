@@ -67,7 +67,7 @@ def simulate(
         As of `analyse`.
     **settings
         Of the simulation, such as ``restitution=0.89``, ``wall_restitution=0.97`` or ``seed=1``;
-        see docs/reference/parameters.md.
+        ``nanorocks simulate --help-all`` lists them.
 
     Returns
     -------

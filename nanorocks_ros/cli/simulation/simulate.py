@@ -71,7 +71,7 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
         '--scene',
         action='store_true',
         help='film the plate with all its trays through the lens of the flight camera, '
-        'into --bag, --video or --picture (one .png or .jpg, at the end); see docs/use/scene.md',
+        'into --bag, --video or --picture (one .png or .jpg, at the end)',
     )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')

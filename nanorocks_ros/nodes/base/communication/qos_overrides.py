@@ -20,6 +20,10 @@ _CHOICES: dict[str, Any] = {
     'reliability': ReliabilityPolicy,
     'durability': DurabilityPolicy,
 }
+_REMEDY = (
+    'name a topic as `ros2 node info` does, and a policy of '
+    'history, depth, reliability and durability'
+)
 _POLICIES = (*_CHOICES, 'depth')
 # The largest depth that DDS accepts.
 _MAX_DEPTH = 2**31 - 1
@@ -70,7 +74,7 @@ def refuse_overrides_of_unknown_topics(
 
 def _refuse(name: str, problem: str | None) -> None:
     if problem is not None:
-        raise ConfigurationError(f'parameter {name}', problem, 'see docs/reference/nodes.md')
+        raise ConfigurationError(f'parameter {name}', problem, _REMEDY)
 
 
 def _parts(name: str) -> list[str]:

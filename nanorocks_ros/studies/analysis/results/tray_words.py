@@ -51,6 +51,7 @@ def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
         lines.append(f'truth:   COR {truth.restitution:g}, walls {truth.wall_restitution:g}')
     if cycles[-1].relation is CorRelation.PAPER:
         lines.append(
-            "relation 'paper': its interval is statistical only, see docs/method/physics.md"
+            "relation 'paper': its interval is statistical only; pass --cooling-relation library "
+            'for one that counts walls and crowding'
         )
     return lines

@@ -312,7 +312,7 @@ def _errata() -> list[Erratum]:
             f'{by_closed_form:.2f}. Its worked example gives {paper_restitution(*decay):.3f} as '
             f'printed, from a decay rate of {rate:.0f} /m, {rate / expected:.1f} times that of a '
             'gas with such beads and walls. Beads that stick cool as fast, and so do beads that '
-            'rub on floor and lid (docs/method/rotation.md).'
+            'rub on floor and lid.'
         ),
         Erratum(
             text=f'The axes of its wall ellipse are printed as a = {printed[0]:g}, b = '

@@ -83,5 +83,5 @@ def test_a_topic_that_the_node_does_not_have_is_refused():
     wrong = '/nanorocks/camera/imageraw'
     with refused(f'this node has no subscription on {wrong} (did you mean {RAW}'):
         give(wrong)
-    with refused(f'this node has no publisher on {RAW}; see docs/reference/nodes.md'):
+    with refused(f'this node has no publisher on {RAW}; name a topic as'):
         give(RAW, 'publisher')
