@@ -13,6 +13,7 @@ Everything in `__all__` is public and stable; it is loaded when it is first used
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.limits import bound_opencv
@@ -89,7 +90,9 @@ if not TYPE_CHECKING:
     def __getattr__(name: str) -> object:
         """A public name, from its module."""
         if name not in _MODULES:
-            raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+            # With the module, Python names the attribute that comes nearest.
+            reason = f'module {__name__!r} has no attribute {name!r}'
+            raise AttributeError(reason, name=name, obj=sys.modules[__name__])
         from importlib import import_module
 
         value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)

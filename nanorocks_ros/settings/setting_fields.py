@@ -23,8 +23,8 @@ ValueType = TypeVar('ValueType')
 
 # What to do about a setting that does not exist, and about a value that is not allowed.
 SETTINGS_LISTED = (
-    "'nanorocks analyse --help-all' lists the settings of a measurement, 'nanorocks simulate "
-    "--help-all' those of a simulation"
+    '`nanorocks analyse --help-all` lists the settings of a measurement, `nanorocks simulate '
+    '--help-all` those of a simulation'
 )
 IN_RANGE = 'give values of this type and range'
 
