@@ -204,9 +204,8 @@ def report() -> None:
     parts = _stages(camera, moving)
     decode = _milliseconds(lambda jpeg: cv2.imdecode(jpeg, cv2.IMREAD_COLOR), jpegs)
     total = _whole(camera, frames)
-    for name, cost in parts.items():
-        print(f'{name:48s}{cost:6.2f} ms {cost / decode:6.2f} of decoding')
-    print(f'{"whole preprocessor":48s}{total:6.2f} ms {total / decode:6.2f} of decoding')
-    print(f'{"decoding a JPEG":48s}{decode:6.2f} ms')
+    print('| stage | ms per frame | / decoding the JPEG |\n| --- | --- | --- |')
+    for name, cost in (*parts.items(), ('whole preprocessor', total), ('decoding a JPEG', decode)):
+        print(f'| {name} | {cost:.2f} | {cost / decode:.2f} |')
     _stabilisation(camera, frames, moments)
     _calibration(camera, frames)
