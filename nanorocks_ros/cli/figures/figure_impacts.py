@@ -77,7 +77,7 @@ def _prior(options: argparse.Namespace) -> PriorSettings:
 
 def _folders(path: Path) -> list[Path]:
     """The folder itself, or those of the recordings of a batch."""
-    from nanorocks_ros.studies.batch.batch_store import BAGS
+    from nanorocks_ros.studies.batch.manifest_entries import BAGS
 
     inner = path / BAGS
     if not inner.is_dir():

@@ -13,7 +13,8 @@ from nanorocks_ros.outputs.tables.table_columns import JOINED, Column
 from nanorocks_ros.outputs.tables.table_files import write_package, write_table
 from nanorocks_ros.records import ClusterEstimate, CorEstimate
 from nanorocks_ros.studies.analysis.results.results_json import BY_SOURCE
-from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined, means_as_json
+from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined
+from nanorocks_ros.studies.batch.means_json import means_as_json
 from nanorocks_ros.studies.results.record_columns import GOOD, columns_of
 
 if TYPE_CHECKING:

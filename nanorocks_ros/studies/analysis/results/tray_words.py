@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.records import CorRelation
 from nanorocks_ros.settings import priors_in_words
+from nanorocks_ros.studies.analysis.results.cycle_lines import cycle_lines
 from nanorocks_ros.studies.analysis.results.cycle_words import (
-    cycle_lines,
     is_decay_left_out,
     tray_reason,
     used_speeds,

@@ -23,10 +23,10 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.records.result_words import FLAGS, WallPrior, flags_in_words, reason_of
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
+from nanorocks_ros.studies.analysis.results.cycle_lines import cycle_lines
 from nanorocks_ros.studies.analysis.results.cycle_words import (
     UsedSpeeds,
     cycle_as_json,
-    cycle_lines,
     is_decay_left_out,
     tray_reason,
     used_speeds,
