@@ -111,7 +111,7 @@ def _simulate_curves(
 ) -> dict[int, Sequence[PackingCurve]]:
     from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.settings import SimulationSettings
-    from nanorocks_ros.studies.analysis.cluster_packing import simulated_packing
+    from nanorocks_ros.studies.analysis.simulated_packing import simulated_packing
 
     settings = SimulationSettings(
         sticking_speed=options.sticking_speed,

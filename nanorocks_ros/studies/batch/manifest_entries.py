@@ -7,15 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nanorocks_ros.studies.batch.batch_task import (
     BagOutcome,
 )
-
-if TYPE_CHECKING:
-    pass
-
 
 # The folder of a batch that holds those of its recordings.
 BAGS = 'bags'
