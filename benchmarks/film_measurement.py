@@ -29,7 +29,7 @@ from nanorocks_ros.stages.restitution.restitution_estimator import (
     RestitutionInput,
 )
 from nanorocks_ros.studies.analysis.bag_images import open_camera
-from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+from nanorocks_ros.studies.analysis.results.results_json import last_of_each_cycle
 from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
 from nanorocks_ros.studies.film_import.import_film import import_films
 from nanorocks_ros.wire.products import is_measured

@@ -15,7 +15,7 @@ import numba
 from numba import extending
 from numba.core import event
 
-from nanorocks_ros.numerics.kernel_cache import share
+from nanorocks_ros.numerics.compilation.kernel_cache import share
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -131,7 +131,7 @@ def _njit(function: Function, options: dict[str, Any]) -> Function:
     decorator: Any = numba.njit(**{**_OPTIONS, **options})
     dispatcher = decorator(function)
     if _LEAN_FROM <= numba.version_info.short < _LEAN_BEFORE:
-        from nanorocks_ros.numerics.lean_compilation import compile_lean
+        from nanorocks_ros.numerics.compilation.lean_compilation import compile_lean
 
         compile_lean(dispatcher)
     return cast('Function', dispatcher)

@@ -20,8 +20,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float32MultiArray, String
 
-from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
-from nanorocks_ros.nodes.base.typed_messages import typed_problem
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message, qos_of
+from nanorocks_ros.nodes.base.communication.typed_messages import typed_problem
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 

@@ -148,7 +148,7 @@ def _experiment(options: argparse.Namespace) -> dict[str, str]:
 def _run_single(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.studies.film_import.import_film import import_films
 
@@ -163,7 +163,7 @@ def _run_single(
 def _run_each(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.studies.film_import.find_films import find_films
     from nanorocks_ros.studies.film_import.import_each import import_each

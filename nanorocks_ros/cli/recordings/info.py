@@ -20,7 +20,7 @@ _MB = 1e6
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.film_inputs import accept_films
+    from nanorocks_ros.cli.imported_films import accept_films
 
     parser = commands.add_parser('info', help='show the contents of a bag and its problems')
     parser.add_argument(
@@ -33,7 +33,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read the bag and print its contents; returns the exit code."""
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.inspection.bag_info import bag_info
 
     with Progress('reading') as progress:

@@ -15,7 +15,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse

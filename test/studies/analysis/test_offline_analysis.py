@@ -25,8 +25,8 @@ from nanorocks_ros.recordings.messages.message_builders import image_message, ti
 from nanorocks_ros.records import CorEstimate, SpeedEstimate
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
-from nanorocks_ros.studies.analysis.results_folder import write_results
-from nanorocks_ros.studies.analysis.results_json import as_json
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_json import as_json
 from nanorocks_ros.studies.results.results_provenance import BAG_NAME
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array, layout
@@ -428,7 +428,7 @@ def test_a_result_that_cannot_be_written_is_printed_all_the_same(tmp_path, capsy
     def full(*_):
         raise OSError(errno.ENOSPC, 'No space left on device')
 
-    monkeypatch.setattr('nanorocks_ros.studies.analysis.results_folder._write_bag', full)
+    monkeypatch.setattr('nanorocks_ros.studies.analysis.results.results_folder._write_bag', full)
     assert run('analyse', path, '--json', '-o', tmp_path / 'out') == 1
     printed = capsys.readouterr()
     assert json.loads(printed.out)['frames'] == 40
