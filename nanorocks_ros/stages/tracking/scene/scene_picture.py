@@ -59,9 +59,7 @@ class SceneColours:
         """The same for pictures that are enlarged; the noise is that of their pixels."""
         if scale == 1:
             return self
-        size = self.background.shape[1] * scale, self.background.shape[0] * scale
-        background = cv2.resize(self.background, size, interpolation=cv2.INTER_CUBIC)
-        return replace(self, background=np.asarray(background, dtype=np.uint8))
+        return replace(self, background=enlarged(self.background, scale))
 
     def picture(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The value that shows the beads best, slightly blurred, (rows, columns)."""
@@ -103,6 +101,14 @@ class SceneColours:
         """Weights and offset that keep the mixture of colours within 0 to 255."""
         offset = -255.0 * np.minimum(self.weights, 0.0).sum()
         return np.append(self.weights, offset).astype(np.float32)[None, :]
+
+
+def enlarged(color: NDArray[np.uint8], scale: int) -> NDArray[np.uint8]:
+    """A picture with so many times the rows and columns."""
+    if scale == 1:
+        return color
+    size = color.shape[1] * scale, color.shape[0] * scale
+    return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
 
 
 def _blurred(values: cv2.typing.MatLike) -> NDArray[np.uint8]:
