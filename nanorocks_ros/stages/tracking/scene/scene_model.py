@@ -26,6 +26,7 @@ from nanorocks_ros.stages.tracking.scene.disc_measures import (
 from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
 from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
 from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, KnownBeads
+from nanorocks_ros.stages.tracking.scene.open_outlines import ends_of_others
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
 from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
 from nanorocks_ros.stages.tracking.scene.roamed_region import (
@@ -147,7 +148,9 @@ class SceneModel:
         if self.colours.knows_background:
             floor, beside = colours_of(self.colours.background, outlines.discs)
             radii = outlines.discs[:, 2] / self.scale
-            here = ~left_behind((colours, around), (floor, beside), self._known, radii)
+            now = colours, around
+            here = ~left_behind(now, (floor, beside), self._known, radii)
+            here &= ~ends_of_others(color, moving, outlines.discs, outlines.support, now)
             outlines = outlines.chosen(here)
             colours, around, floor = colours[here], around[here], floor[here]
         moves = marked_shares(moving, outlines.discs)
