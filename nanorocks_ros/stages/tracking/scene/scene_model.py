@@ -63,8 +63,9 @@ _ALIKE_MOVING = 6.0
 _LEAST_RADIUS_PX = 6.5
 # Discs of the other brightness count when they are at least this part.
 _OTHER_SIGN_SHARE = 0.4
-# A search begins where a bead is expected, and not again within this part of its radius.
-_SAME_SHARE = 0.2
+# A search begins where a bead is expected, and not again within this part of its radius where
+# that shows an outline with this support and step over the usual one.
+_SAME_SHARE, _SURE_SUPPORT, _SURE_STEP = 0.8, 0.7, 0.5
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
 
@@ -185,11 +186,16 @@ class SceneModel:
         """Discs that show in a view, smeared ones where it moves; their steps over the usual."""
         picture = view.of(color, self.colours)
         starts = centres_of_all_sizes(picture, view.voting, _LEAST_VOTES)[:, :3]
-        if hints is not None and len(hints):
-            apart_from_hints = cKDTree(hints[:, :2]).query(starts[:, :2])[0]
-            elsewhere = apart_from_hints > _SAME_SHARE * view.voting.smallest
-            starts = np.concatenate([starts[elsewhere], hints])
-        outlines = fit_outlines(picture, starts, view.voting)
+        outlines = fit_outlines(picture, np.empty((0, 3)) if hints is None else hints, view.voting)
+        sure = outlines.discs[
+            (outlines.support >= _SURE_SUPPORT) & (outlines.steps >= _SURE_STEP * view.voting.step)
+        ]
+        if len(sure):
+            apart_from_sure = cKDTree(sure[:, :2]).query(starts[:, :2])[0]
+            starts = starts[apart_from_sure > _SAME_SHARE * view.voting.smallest]
+        outlines = join_outlines([outlines, fit_outlines(picture, starts, view.voting)])
+        if hints is not None:
+            starts = np.concatenate([hints, starts])
         steps = outlines.steps / view.voting.step
         good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
         good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * view.voting.noise)
