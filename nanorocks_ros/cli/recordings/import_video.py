@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.cli.flags import add_flag, flag_of, settings_from
 from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, rows
 
 if TYPE_CHECKING:
@@ -239,6 +238,8 @@ def _text(imported: ImportResult) -> str:
 
 
 def _as_json(imported: ImportResult) -> dict[str, Any]:
+    from nanorocks_ros.records import NS
+
     return {
         'frames': imported.frames,
         'duplicates_dropped': imported.duplicates_dropped,

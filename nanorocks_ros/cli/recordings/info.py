@@ -10,8 +10,6 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.records import NS
-
 if TYPE_CHECKING:
     from nanorocks_ros.studies.inspection.bag_info import BagInfo, TopicReport
 
@@ -46,6 +44,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _as_json(info: BagInfo) -> dict[str, Any]:
+    from nanorocks_ros.records import NS
+
     lens = info.calibration
     return {
         'topics': [_topic_as_json(report) for report in info.topics.values()],
@@ -73,6 +73,8 @@ def _as_json(info: BagInfo) -> dict[str, Any]:
 
 
 def _topic_as_json(report: TopicReport) -> dict[str, Any]:
+    from nanorocks_ros.records import NS
+
     stamps = report.stamps_ns
     return {
         'name': report.info.name,
