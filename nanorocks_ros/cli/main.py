@@ -62,8 +62,14 @@ COMMANDS = {
 """By task and command, the module of `nanorocks_ros.cli` that adds its parser; as in the help."""
 
 
-def build_parser() -> CommandParser:
-    """The parser of all commands; heavy imports wait until a command runs."""
+def build_parser(command: str | None = None) -> CommandParser:
+    """The parser of all commands; heavy imports wait until a command runs.
+
+    Parameters
+    ----------
+    command : str, optional
+        The only command that is parsed: the modules of the others are not imported.
+    """
     from importlib import import_module
 
     from nanorocks_ros import __version__
@@ -76,11 +82,14 @@ def build_parser() -> CommandParser:
     )
     parser.add_argument('--version', action='version', version=f'nanorocks {__version__}')
     commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
-    for modules in COMMANDS.values():
-        for module in modules.values():
-            import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
-    parser.group_commands(COMMANDS)
+    all_modules = {name: path for task in COMMANDS.values() for name, path in task.items()}
     # What completes them is made of all commands.
+    if command in all_modules and command != 'completion':
+        import_module(f'nanorocks_ros.cli.{all_modules[command]}').add_parser(commands)
+        return parser
+    for module in all_modules.values():
+        import_module(f'nanorocks_ros.cli.{module}').add_parser(commands)
+    parser.group_commands(COMMANDS)
     parser.set_defaults(parser=parser)
     return parser
 
@@ -98,7 +107,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with Interrupts() as interrupts:
         try:
             _set_up()
-            options = build_parser().parse_args(arguments)
+            words = sys.argv[1:] if arguments is None else arguments
+            options = build_parser(*words[:1]).parse_args(words)
             return _run(options)
         except KeyboardInterrupt as interruption:
             return _interrupted(str(interruption))

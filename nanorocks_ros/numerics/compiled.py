@@ -7,7 +7,6 @@ and integers, this makes states and pictures bit-identical on every machine.
 from __future__ import annotations
 
 import logging
-from contextlib import suppress
 from functools import update_wrapper
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -15,7 +14,7 @@ import numba
 from numba import extending
 from numba.core import event
 
-from nanorocks_ros.numerics.compilation.kernel_cache import share
+from nanorocks_ros.numerics.compilation.kernel_cache import SharedCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,10 +26,13 @@ _SLOWEST = {'run_until': 'the simulation', 'cover_with_discs': 'the tracking'}
 
 _OPTIONS = {'error_model': 'numpy', 'nogil': True}
 
-# `lean_compilation` replaces parts of numba that no version promises to keep. It was tested with
-# the first and the last of these; with others numba compiles in its own way, which takes twice as
-# long and gives the same numbers.
-_LEAN_FROM, _LEAN_BEFORE = (0, 59), (0, 69)
+# `lean_compilation` and `kernel_loading` replace parts of numba that no version promises to keep.
+# They were tested with the first and the last of these; with others numba compiles and loads in
+# its own way, which takes twice as long and gives the same numbers.
+_IS_LEAN = (0, 59) <= numba.version_info.short < (0, 69)
+if _IS_LEAN:
+    from nanorocks_ros.numerics.compilation.kernel_loading import use_kernel_cache
+    from nanorocks_ros.numerics.compilation.lean_compilation import compile_lean
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 
@@ -116,22 +118,21 @@ def inlined(function: Function) -> Function:
 
 
 def _compiled(function: Function, options: dict[str, Any]) -> Function:
-    try:
-        dispatcher: Any = _njit(function, {**options, 'cache': True})
-    except RuntimeError:
-        # numba does not cache if neither the package nor the home is writable.
-        return _njit(function, options)
-    # A numba that keeps its cache in another way keeps it where it wants to.
-    with suppress(AttributeError):
-        share(dispatcher, function.__module__)
+    dispatcher: Any = _njit(function, options)
+    SharedCache(dispatcher, function.__module__, _enable_cache)
     return cast('Function', dispatcher)
+
+
+def _enable_cache(dispatcher: Any) -> None:
+    if _IS_LEAN:
+        use_kernel_cache(dispatcher)
+    else:
+        dispatcher.enable_caching()
 
 
 def _njit(function: Function, options: dict[str, Any]) -> Function:
     decorator: Any = numba.njit(**{**_OPTIONS, **options})
     dispatcher = decorator(function)
-    if _LEAN_FROM <= numba.version_info.short < _LEAN_BEFORE:
-        from nanorocks_ros.numerics.compilation.lean_compilation import compile_lean
-
+    if _IS_LEAN:
         compile_lean(dispatcher)
     return cast('Function', dispatcher)

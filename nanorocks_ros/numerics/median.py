@@ -1,17 +1,19 @@
-"""Median of many numbers by counting in buckets, without unpredictable branches."""
+"""Median of many numbers by counting in buckets, without unpredictable branches; quantiles."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Below this size a partition is as fast.
+# Below this size a sort is as fast.
 _MANY = 100
 # Bits of a number that the bucket ignores: 32 buckets per factor of two.
 _SHIFT = 47
@@ -32,7 +34,8 @@ def median_of(values: NDArray[np.float64]) -> float:
     for k in range(n):
         smallest, largest = min(smallest, bits[k]), max(largest, bits[k])
     if n < _MANY or smallest < 0 or largest >= _INFINITE:
-        return float(np.median(values))
+        order = stable_argsort(values)
+        return float((values[order[(n - 1) // 2]] + values[order[n // 2]]) / 2)
     counts = np.zeros(_BUCKETS, dtype=np.int32)
     lowest = (largest >> _SHIFT) - (_BUCKETS - 1)
     for k in range(n):
@@ -53,5 +56,22 @@ def median_of(values: NDArray[np.float64]) -> float:
         if first <= max((bits[k] >> _SHIFT) - lowest, 0) <= last:
             near[m] = values[k]
             m += 1
-    near.sort()
-    return float((near[low_rank - below] + near[high_rank - below]) / 2)
+    order = stable_argsort(near)
+    return float((near[order[low_rank - below]] + near[order[high_rank - below]]) / 2)
+
+
+@compiled
+def quantile_of(values: NDArray[np.float64], share: float) -> float:
+    """The quantile of numbers, at least one, (n,), between the two nearest; NaN where one is.
+
+    As `numpy.quantile`, but for rounding, for a share below 1.
+    """
+    order = stable_argsort(values)
+    if math.isnan(values[order[-1]]):
+        return math.nan
+    rank = 1 + (values.size - 1) * share
+    below = math.floor(rank)
+    rest = rank - below
+    if below == values.size:
+        return float(values[order[-1]])
+    return float(values[order[below - 1]] * (1 - rest) + values[order[below]] * rest)

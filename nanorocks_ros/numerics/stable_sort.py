@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +14,11 @@ if TYPE_CHECKING:
 
 
 @compiled
-def stable_argsort(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Indices of the values from the smallest to the largest; equals keep their order.
+def stable_argsort(values: NDArray[np.float64] | NDArray[np.integer]) -> NDArray[np.int64]:
+    """Indices of the values from the smallest to the largest, and NaN; equals keep their order.
 
-    Runs of 1, 2, 4, ... values are merged two by two.
+    Runs of 1, 2, 4, ... values are merged two by two. The sorts of numba take far longer to
+    compile: they call themselves, and are made once more for each type.
     """
     n = values.size
     order = np.arange(n)
@@ -32,7 +34,7 @@ def stable_argsort(values: NDArray[np.float64]) -> NDArray[np.int64]:
 
 @compiled
 def _merge(
-    values: NDArray[np.float64],
+    values: NDArray[np.float64] | NDArray[np.integer],
     order: NDArray[np.int64],
     merged: NDArray[np.int64],
     start: int,
@@ -43,9 +45,17 @@ def _merge(
     end = min(start + 2 * run, order.size)
     low, high = start, middle
     for k in range(start, end):
-        if high == end or (low < middle and not values[order[low]] > values[order[high]]):
+        if high == end or (
+            low < middle and not _is_above(values[order[low]], values[order[high]])
+        ):
             merged[k] = order[low]
             low += 1
         else:
             merged[k] = order[high]
             high += 1
+
+
+@compiled
+def _is_above(value: float, other: float) -> bool:
+    """Whether a value is sorted behind another; NaN is behind all others."""
+    return value > other or (math.isnan(value) and not math.isnan(other))

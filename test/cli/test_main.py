@@ -29,7 +29,7 @@ def test_a_system_error_is_one_line_that_names_the_file(monkeypatch, capsys, arg
 
     parser = argparse.ArgumentParser()
     parser.set_defaults(run=run)
-    monkeypatch.setattr(command, 'build_parser', lambda: parser)
+    monkeypatch.setattr(command, 'build_parser', lambda *_: parser)
     assert command.main([]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line == f'nanorocks: {message}free some space, or write elsewhere'

@@ -17,14 +17,20 @@ import time
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.numerics.compilation.compile_lock import compile_once
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 # Imports at the left margin; those for the type checker alone are indented and not compiled.
 _IMPORT = re.compile(rb'^(?:from|import) ([\w.]+)', re.MULTILINE)
-# How functions are compiled; imported by a function, and not where numba compiles in its own way.
-_COMPILER = 'nanorocks_ros.numerics.compilation.lean_compilation'
+# How functions are compiled and kept; imported by a function, and not where numba does both.
+_COMPILER = (
+    'nanorocks_ros.numerics.compilation.lean_compilation',
+    'nanorocks_ros.numerics.compilation.kernel_loading',
+)
 _DAY_S = 86_400.0
 # Folders of code that was not used for so long are removed, [s].
 _UNUSED_S = 30.0 * _DAY_S
@@ -39,23 +45,50 @@ def cache_root() -> Path:
     return (Path(caches) if caches else Path.home() / '.cache') / 'nanorocks_ros' / 'kernels'
 
 
-def share(dispatcher: Any, module: str) -> None:
-    """Keep the compiled versions of a function in the folder of its code.
+class SharedCache:
+    """The compiled versions of a function on disk, in the folder of its code.
 
-    Where that cannot be made, they stay where numba keeps them.
+    It is made when Python calls the function: most functions are called by compiled ones alone.
+    Where the folder cannot be made, they stay where numba keeps them.
 
     Parameters
     ----------
     dispatcher : numba dispatcher
-        With ``cache=True``.
+        Its cache is replaced by this one.
     module : str
         Name of the module of the function.
+    enable : callable
+        Gives the dispatcher a cache of numba.
     """
-    # The doctor asks for the folder where numba may be missing.
+
+    def __init__(self, dispatcher: Any, module: str, enable: Callable[[Any], None]) -> None:
+        self._dispatcher, self._module, self._enable = dispatcher, module, enable
+        # Read now: a file that is changed later is not what was imported.
+        self._code = code_key(module)
+        dispatcher._cache = self
+
+    def __getattr__(self, name: str) -> Any:
+        """What numba asks a cache for, of the one that is made now."""
+        return getattr(self._made(), name)
+
+    def _made(self) -> Any:
+        if self._dispatcher._cache is self:
+            # The doctor asks for the folder where numba may be missing.
+            from numba.core.caching import NullCache
+
+            self._dispatcher._cache = NullCache()
+            # numba does not cache if neither the package nor the home is writable.
+            with suppress(RuntimeError):
+                self._enable(self._dispatcher)
+                _share(self._dispatcher, self._module, self._code)
+        return self._dispatcher._cache
+
+
+def _share(dispatcher: Any, module: str, code: str) -> None:
+    """Keep the compiled versions of a function in the folder of its code."""
     from numba.core.caching import IndexDataCacheFile
 
     own = dispatcher._cache
-    code = code_key(module)
     try:
         folder = _folder(module, code)
     except (OSError, RuntimeError):
@@ -78,7 +111,7 @@ def code_key(module: str) -> str:
     """A short hash of a module, of all of its package that it imports, and of the compiler."""
     package = module.partition('.')[0]
     texts: dict[str, bytes] = {}
-    pending = [module, _COMPILER]
+    pending = [module, *_COMPILER]
     while pending:
         name = pending.pop()
         path = getattr(sys.modules.get(name), '__file__', None)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -119,7 +120,7 @@ def select_seen(
         energies, positions, velocities, velocity_errors, radii, species, seen
     )
     rows = np.flatnonzero(seen)
-    rows = rows[np.argsort(ids[rows], kind='mergesort')]
+    rows = rows[stable_argsort(ids[rows])]
     measured = radius_errors[rows]
     for k in range(rows.size):
         if equal_sizes[species[rows[k]]]:
@@ -172,7 +173,7 @@ def velocity_variances(
         return variances
     # Sorted by column, so that only beads nearby are compared.
     columns = positions[rows[:count], 0].copy()
-    order = np.argsort(columns)
+    order = stable_argsort(columns)
     columns, rows, ratios = columns[order], rows[order], ratios[order]
     squared_distances, nearest_ratios = np.empty(_N_NEIGHBOURS), np.empty(_N_NEIGHBOURS)
     for k in range(n):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 
 MAX_DISTANCE = 1.03
 """Largest distance of two beads that may touch, in sums of radii, but for errors."""
@@ -69,7 +70,7 @@ def touching_pairs(
             MAX_DISTANCE * beads.radii[i] + _DISTANCE_SIGMAS * math.sqrt(variances[i]),
         )
     # Sorted by column, so that only beads nearby are compared.
-    order = np.argsort(beads.positions[:, 0].copy())
+    order = stable_argsort(beads.positions[:, 0].copy())
     keys, first, second = np.empty((3, 4 * n), dtype=np.int64)
     count = 0
     for rank in range(n):
@@ -85,7 +86,7 @@ def touching_pairs(
             keys[count] = (beads.ids[i] << SHIFT) | beads.ids[j]
             first[count], second[count] = i, j
             count += 1
-    by_key = np.argsort(keys[:count])
+    by_key = stable_argsort(keys[:count])
     return keys[by_key], first[by_key], second[by_key]
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.median import median_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,4 +60,4 @@ def add_flight(residuals: ResidualVariance, species: int, flight: NDArray[np.flo
     residuals.counts[species] = count + 1
     if count + 1 >= _MIN_FLIGHTS:
         samples = residuals.samples[species, : min(count + 1, _MAX_FLIGHTS)]
-        residuals.variances[species] = np.median(samples)
+        residuals.variances[species] = median_of(samples)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.median import median_of
 from nanorocks_ros.stages.contacts.oscillation_fit import (
     SwingDecay,
     fit_slope,
@@ -276,4 +277,4 @@ def _frame_statistics(
         if square < np.inf:
             sums[species[k], 0] += square
             sums[species[k], 1] += 1.0
-    return float(np.median(times[1:] - times[:-1])) if times.size > 1 else math.inf
+    return median_of(times[1:] - times[:-1]) if times.size > 1 else math.inf

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
+from nanorocks_ros.numerics.median import median_of
 from nanorocks_ros.records import NS
 
 if TYPE_CHECKING:
@@ -148,7 +149,7 @@ def _write_steps(
             steps[count, axis] = end - earlier_positions[j, axis] - earlier_displacement[axis]
         lengths[count] = math.hypot(steps[count, 0], steps[count, 1])
         count += 1
-    median = float(np.median(lengths[:count])) if count else math.nan
+    median = median_of(lengths[:count]) if count else math.nan
     return count, median
 
 

@@ -49,6 +49,15 @@ def test_settings_are_grouped_by_stage_with_choices_and_units():
     assert '--preprocess-stabilise on|off' in text
 
 
+def test_a_command_alone_is_parsed_as_among_all_and_completion_knows_all():
+    commands = build_parser().commands()
+    for name, parser in commands.items():
+        alone = build_parser(name).commands()
+        assert alone[name].format_full_help() == parser.format_full_help()
+        assert set(alone) == (set(commands) if name == 'completion' else {name})
+    assert set(build_parser('no-command').commands()) == set(commands)
+
+
 def test_the_commands_are_listed_by_task(capsys):
     assert set(build_parser().commands()) == {name for task in COMMANDS.values() for name in task}
     with pytest.raises(SystemExit) as ended:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
+from nanorocks_ros.numerics.median import quantile_of
 from nanorocks_ros.stages.tracking.linking.track_store import ALIKE_RADII
 
 if TYPE_CHECKING:
@@ -260,7 +261,7 @@ def straight_variance(squares: NDArray[np.float64]) -> float:
     float
         Of a coordinate; NaN where straight paths are few.
     """
-    narrow = float(np.quantile(squares, 0.1)) / _DECILE
+    narrow = quantile_of(squares, 0.1) / _DECILE
     wide = max(float(squares.mean()), _LEAST_CONTRAST * narrow)
     share = 0.5
     if not narrow > 0.0:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined, kernel
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 from nanorocks_ros.stages.tracking.linking.link_probabilities import MIN_VELOCITY_CHANGE_PX_S
 from nanorocks_ros.stages.tracking.linking.track_store import TrackStore
 
@@ -84,7 +85,7 @@ def write_hints(
     """
     count = variances.size
     predict(tracks, time, walls, positions, variances)
-    order = np.argsort(-tracks.visible_shares[:count], kind='mergesort')
+    order = stable_argsort(-tracks.visible_shares[:count])
     for row in range(count):
         k = order[row]
         hints[row, 0] = positions[k, 0] - walls.low[0]

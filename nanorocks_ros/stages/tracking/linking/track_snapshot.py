@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, kernel
+from nanorocks_ros.numerics.stable_sort import stable_argsort
 from nanorocks_ros.stages.tracking.linking.motion_prediction import (
     MIN_RADIUS_VARIANCE,
     Walls,
@@ -160,7 +161,7 @@ def write_in_metres(
         Written: number of visible beads of each species.
     """
     seen[:] = 0
-    order = np.argsort(snapshot.ids[: scaled.ids.size], kind='mergesort')
+    order = stable_argsort(snapshot.ids[: scaled.ids.size])
     for row in range(order.size):
         k = order[row]
         scaled.ids[row], scaled.species[row] = snapshot.ids[k], snapshot.species[k]
