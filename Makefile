@@ -28,8 +28,8 @@ export PYTHON
 RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-oldest test-package golden lint bench docs docs-pages site venv \
-        messages lock clean
+.PHONY: help demo test test-nodes test-oldest test-oldest-meanwhile dependencies-oldest \
+        test-package golden lint bench docs docs-pages site venv messages lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -44,20 +44,25 @@ SIDE_BY_SIDE := --numprocesses auto --dist loadfile
 # In the order of test/conftest.py; the oldest pytest-xdist sorts files in its own.
 LONGEST_FIRST := $(SIDE_BY_SIDE) --no-loadscope-reorder
 
-# The tests of the nodes mostly wait: meanwhile the next environment is installed, in time that they
-# leave. What fails there is tried again, and said, by test-oldest.
-test: venv ## Run all tests, then those of the core with the oldest dependencies
+# The tests of the nodes mostly wait: meanwhile those with the oldest dependencies run, in time that
+# they leave.
+test: venv ## Run all tests, and those of the core with the oldest dependencies
 	@$(RUN) python -m pytest $(LONGEST_FIRST) $(patsubst %,--ignore=%,$(NODES)) $(PYTEST_ARGS)
-	@nice -n 19 sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt & \
-	    status=0; \
-	    $(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS) || status=$$?; \
-	    wait; exit $$status
-	@$(MAKE) test-oldest
+	@$(MAKE) --jobs 2 test-nodes test-oldest-meanwhile
+
+test-nodes: venv
+	@$(RUN) python -m pytest $(SIDE_BY_SIDE) $(NODES) $(PYTEST_ARGS)
+
+# What it says comes at the end, in one piece.
+test-oldest-meanwhile:
+	@mkdir -p build; status=0; \
+	    nice -n 19 $(MAKE) test-oldest >build/test_oldest.log 2>&1 || status=$$?; \
+	    cat build/test_oldest.log; exit $$status
 
 # What takes minutes and only goes through, once more, what other tests go through (or compares a
-# picture, which another Matplotlib letters in another way): analyses of
-# whole bags go through all stages and the inference. The simulation is the same, bit by bit, with
-# all dependencies, and one command of it is enough.
+# picture, which another Matplotlib letters in another way; or reads texts of the repository alone):
+# analyses of whole bags go through all stages and the inference. The simulation is the same, bit
+# by bit, with all dependencies, and one command of it is enough.
 ONCE := test/golden test/validation test/simulation test/inference test/stages test/pipeline \
         test/dashboard/test_page.py test/physics/test_confined_theory.py \
         test/studies/reproduction test/studies/batch test/studies/calibration \
@@ -68,7 +73,13 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/cli/films test/studies/gas_statistics test/tools/docs_pages \
         test/studies/figures/test_demo_figure.py test/studies/inspection \
         test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
-        test/cli/test_interrupts.py
+        test/cli/test_interrupts.py test/test_docs.py test/test_external_links.py \
+        test/test_mirror.py test/test_validation_tables.py test/test_installation.py
+
+# Beside `make venv`, see .ci/run.
+dependencies-oldest:
+	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt own dependencies
+
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \

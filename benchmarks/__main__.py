@@ -34,6 +34,7 @@ ALL = (
     'plate_cost',
     'recorder',
     'foreign_world',
+    'collision_truth',
     'altered_films',
     'ranks',
     'contacts_alone',

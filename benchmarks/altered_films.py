@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.film_measurement import measure
 from benchmarks.film_truth import read_truth
 from benchmarks.foreign_world import FOREIGN, films_by_other_code, foreign_row, print_heading
-from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 
 if TYPE_CHECKING:

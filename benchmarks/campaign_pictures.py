@@ -20,12 +20,12 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.confined_decay import confined_restitution
 from nanorocks_ros.inference.decay.haff_fit import fit_haff
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.physics.error_propagation import Estimate
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.studies.analysis.cluster_packing import simulated_packing
+from nanorocks_ros.studies.analysis.simulated_packing import simulated_packing
 
 _TRAYS, _CYCLES, _EACH, _QUIET = (1, 3, 5), 60, 10, range(17, 25)
 _ERROR, _WALLS = 1e-4, 0.97

@@ -14,8 +14,8 @@ import numpy as np
 
 from nanorocks_ros.cli.main import main as nanorocks
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.simulation.shaken_tray import ShakenTray

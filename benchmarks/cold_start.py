@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 _ANALYSE = """
 import sys
-from nanorocks_ros.numerics import lean_compilation
+from nanorocks_ros.numerics.compilation import lean_compilation
 if {by_numba}:
     lean_compilation.compile_lean = lambda function: None
 from nanorocks_ros.cli.main import main

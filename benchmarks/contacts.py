@@ -29,7 +29,7 @@ from nanorocks_ros.settings import (
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 _RATE = 30.0

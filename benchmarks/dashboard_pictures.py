@@ -1,6 +1,6 @@
 """Take the pictures of the live page: ``python -m benchmarks.dashboard_pictures BAG [FOLDER]``.
 
-Plays a film of the plate slowly enough for the pipeline to process all frames, and writes
+Plays a film of the plate as fast as the pipeline follows, and writes
 dashboard.png, dashboard_phone.png and dashboard_compare.png for the documentation into
 docs/pictures or the given folder.
 BAG is made by
@@ -23,8 +23,8 @@ from benchmarks.live import start_node
 
 _TRAY = 3
 _AFTER_S = 18
-_RATE = 0.3
-_PATIENCE_S = 300.0
+_RATE = 0.0
+_PATIENCE_S = 900.0
 _DOMAIN = '60'
 _WIDE = {'viewport': {'width': 1440, 'height': 900}, 'color_scheme': 'light'}
 _PHONE = {'viewport': {'width': 390, 'height': 844}, 'color_scheme': 'dark'}

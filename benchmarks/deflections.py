@@ -19,7 +19,7 @@ from nanorocks_ros.experiment.view import View
 from nanorocks_ros.records import BeadsTruth, Frame, Tracks, TrayImage
 from nanorocks_ros.settings import SceneSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:

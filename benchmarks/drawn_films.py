@@ -26,7 +26,7 @@ from benchmarks.film_measurement import FilmResult, is_flagged, measure
 from benchmarks.film_truth import FilmTruth, read_truth
 from benchmarks.filmed_cycles import folder
 from benchmarks.rough_gas import SMOOTH, Roughness
-from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.outputs.atomic_files import write_bytes

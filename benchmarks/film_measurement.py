@@ -19,6 +19,7 @@ from nanorocks_ros.records import (
     CorEstimate,
     CorStatus,
     Notice,
+    PairCollision,
     Quality,
     SpeedEstimate,
     Tracks,
@@ -29,7 +30,7 @@ from nanorocks_ros.stages.restitution.restitution_estimator import (
     RestitutionInput,
 )
 from nanorocks_ros.studies.analysis.bag_images import open_camera
-from nanorocks_ros.studies.analysis.results_json import last_of_each_cycle
+from nanorocks_ros.studies.analysis.results.results_json import last_of_each_cycle
 from nanorocks_ros.studies.film_import.film_inputs import ImportSettings
 from nanorocks_ros.studies.film_import.import_film import import_films
 from nanorocks_ros.wire.products import is_measured
@@ -71,6 +72,9 @@ class FilmResult:
         Of each species: median of the measured radii over the mean true one.
     errors : tuple of PlaceErrors or None
         Of each species: stated errors of places and radii over the true ones.
+    collisions : tuple of PairCollision
+    epoch_ns : int
+        Stamp of the first frame.
     """
 
     refusal: str = ''
@@ -82,6 +86,8 @@ class FilmResult:
     counts: tuple[float, ...] = ()
     radii: tuple[float, ...] = ()
     errors: tuple[PlaceErrors | None, ...] = ()
+    collisions: tuple[PairCollision, ...] = ()
+    epoch_ns: int = 0
 
     @property
     def final(self) -> CorEstimate | None:
@@ -154,6 +160,10 @@ class _Reading:
             counts=self._counts(),
             radii=self._radii(epoch_ns),
             errors=place_errors(self._film, self._tracks, epoch_ns),
+            collisions=tuple(
+                record for record in self._records if isinstance(record, PairCollision)
+            ),
+            epoch_ns=epoch_ns,
         )
 
     def _keep(self, records: Iterable[Result], notices: list[str]) -> None:

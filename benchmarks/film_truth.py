@@ -53,6 +53,7 @@ class FilmTruth:
         In space, as speeds are measured: a plate that swings does not move the beads above it.
     heights : ndarray (frames, beads), [m]
         Above the floor.
+    vertical_velocities : ndarray (frames, beads), [m/s]
     radii : ndarray (beads,), [m]
     species : ndarray of int, (beads,)
     merges : ndarray (merges,), [s]
@@ -73,6 +74,7 @@ class FilmTruth:
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
     heights: NDArray[np.float64]
+    vertical_velocities: NDArray[np.float64]
     radii: NDArray[np.float64]
     species: NDArray[np.int64]
     merges: NDArray[np.float64]
@@ -146,6 +148,7 @@ def read_truth(video: Path) -> FilmTruth:
         positions=arrays['P'][..., :2].astype(np.float64) - displacement[:, np.newaxis],
         velocities=arrays['V'][..., :2].astype(np.float64),
         heights=arrays['P'][..., 2].astype(np.float64),
+        vertical_velocities=arrays['V'][..., 2].astype(np.float64),
         radii=arrays['rad'].astype(np.float64),
         species=arrays['sp'].astype(np.int64),
         merges=np.asarray(arrays['merges'], dtype=np.float64).reshape(-1, 3)[:, 0],

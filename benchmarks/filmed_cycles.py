@@ -39,7 +39,7 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 FOLDER = 'NANOROCKS_FILMS'
 """Environment variable with the folder of the films; default: in the temporary directory."""

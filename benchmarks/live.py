@@ -32,7 +32,7 @@ class _Tally:
         node.listen(topics.GRAY, self._processed, 1, required=False)
 
     def _processed(self, message) -> None:
-        from nanorocks_ros.nodes.base.ros_messages import stamp_of
+        from nanorocks_ros.nodes.base.communication.ros_messages import stamp_of
 
         stamp_ns = stamp_of(message.header.stamp)
         self.latencies[stamp_ns] = 1e-9 * (time.time_ns() - stamp_ns)

@@ -72,7 +72,7 @@ class _Tally:
                 self._listen(topic, tray, self._counted(tray, topic.name))
 
     def _listen(self, topic, tray: int, take) -> None:
-        from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
+        from nanorocks_ros.nodes.base.communication.ros_messages import message_class, qos_of
 
         kind = message_class(topic.type)
         self._node.create_subscription(kind, topic.of(tray), take, qos_of(topic), raw=True)
@@ -160,8 +160,8 @@ def _run(bag: Path, run: str, folder: str, cleanup: ExitStack) -> None:
     import rclpy
     from rclpy.experimental.events_executor import EventsExecutor
 
+    from nanorocks_ros.nodes.base.communication.ros_messages import message_class, qos_of
     from nanorocks_ros.nodes.base.node import NanorocksNode
-    from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
     from nanorocks_ros.wire import topics
 
     node = NanorocksNode('benchmark')

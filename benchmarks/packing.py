@@ -21,7 +21,8 @@ from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.clusters.packing_density import bodies_of_pairs, packing_of_clusters
-from nanorocks_ros.studies.analysis.cluster_packing import compaction, simulated_packing
+from nanorocks_ros.studies.analysis.cluster_packing import compaction
+from nanorocks_ros.studies.analysis.simulated_packing import simulated_packing
 
 _SPEEDS = (0.0, 0.001, 0.003, 0.0104)
 _CYCLES = 18

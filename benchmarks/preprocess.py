@@ -26,9 +26,9 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.preprocess.frame_checks import FrameChecks
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.gray_image_checks import picture_quality
 from nanorocks_ros.stages.preprocess.plate_search import guess_plate
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.rectify import mix_weights, nodes_of, resample_color
 from nanorocks_ros.stages.preprocess.shaking.shake_detection import MotionMeter
 from nanorocks_ros.stages.preprocess.stabilise import TrayRegistration
@@ -204,9 +204,8 @@ def report() -> None:
     parts = _stages(camera, moving)
     decode = _milliseconds(lambda jpeg: cv2.imdecode(jpeg, cv2.IMREAD_COLOR), jpegs)
     total = _whole(camera, frames)
-    for name, cost in parts.items():
-        print(f'{name:48s}{cost:6.2f} ms {cost / decode:6.2f} of decoding')
-    print(f'{"whole preprocessor":48s}{total:6.2f} ms {total / decode:6.2f} of decoding')
-    print(f'{"decoding a JPEG":48s}{decode:6.2f} ms')
+    print('| stage | ms per frame | / decoding the JPEG |\n| --- | --- | --- |')
+    for name, cost in (*parts.items(), ('whole preprocessor', total), ('decoding a JPEG', decode)):
+        print(f'| {name} | {cost:.2f} | {cost / decode:.2f} |')
     _stabilisation(camera, frames, moments)
     _calibration(camera, frames)

@@ -25,7 +25,7 @@ from scipy import stats
 from benchmarks.contacts import contacts_of, true_tracks
 from benchmarks.drawn import varied
 from benchmarks.filmed_cycles import folder
-from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_library import LOWEST_WALL

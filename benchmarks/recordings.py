@@ -91,8 +91,8 @@ def _imports(folder: Path) -> None:
         ]
         decode, total = (min(column) for column in zip(*pairs, strict=True))
         print(
-            f'import, {label:18} {_FRAMES / total:7.1f} frames/s, decode only '
-            f'{_FRAMES / decode:7.1f}, ratio {decode / total:5.2f}'
+            f'| import, {label} | {_FRAMES / total:.0f} frames/s '
+            f'| decoding alone: {_FRAMES / decode:.0f} | {decode / total:.2f} |'
         )
 
 
@@ -135,8 +135,8 @@ def _salvages(folder: Path) -> None:
     copy, salvaged = (min(column) for column in zip(*pairs, strict=True))
     size = file.stat().st_size / 1e6
     print(
-        f'salvage, cut short      {size / salvaged:7.0f} MB/s, plain copy {size / copy:7.0f}, '
-        f'ratio {copy / salvaged:5.2f}'
+        f'| salvage, cut short | {size / salvaged:.0f} MB/s | plain copy: {size / copy:.0f} MB/s '
+        f'| {copy / salvaged:.2f} |'
     )
     for name in ('cut', 'copy', 'new'):
         shutil.rmtree(folder / name)
@@ -180,13 +180,14 @@ def _opening(folder: Path) -> None:
     for label, columns in rows.items():
         ours, rosbags = (statistics.median(column) for column in columns)
         print(
-            f'{_GB:g} GB, {label:14} {1e3 * ours:9.1f} ms, rosbags {1e3 * rosbags:9.1f} ms, '
-            f'ratio {rosbags / ours:6.2f}'
+            f'| {_GB:g} GB, {label} | {1e3 * ours:.1f} ms | `rosbags`: {1e3 * rosbags:.1f} ms '
+            f'| {rosbags / ours:.2f} |'
         )
 
 
 def report() -> None:
     """Print the table."""
+    print('| what | measured | beside | ratio |\n| --- | --- | --- | --- |')
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _imports(folder)

@@ -167,8 +167,9 @@ def report() -> None:
         for name, rules in _CASES[_TURNING]:
             print(_conservation_row(number, name, rules), flush=True)
     print(
-        f'\n| tray | sticks below | after [s] | clusters | beads per cluster | beads in clusters '
-        f'[%] | beads per body | weighted ({_RUNS} cycles) |\n' + '| --- ' * 8 + '|'
+        f'\n{_RUNS} cycles each:\n\n'
+        '| tray | sticks below | after [s] | clusters | beads per cluster | beads in clusters '
+        '[%] | beads per body | weighted |\n' + '| --- ' * 8 + '|'
     )
     for number in _TRAYS:
         paper = PAPER_TABLE_3[number]

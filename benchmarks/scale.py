@@ -18,7 +18,7 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Frame, Notice, PairCollision, Quality, TrayImage
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
 from nanorocks_ros.stages.tracking.tracker import Tracker
 

@@ -109,13 +109,14 @@ def row(name: str, results: list, truths: tuple[float, float]) -> str:
         values = [getattr(result.alone, kind) for result in results]
         known = [value for value in values if np.isfinite(value.restitution.value)]
         if len(known) < 3:
-            cells += [f'{len(known)} of {len(values)}', '', '', '']
+            cells += [f'{len(known)} of {len(values)} films' if known else '', '', '', '']
             continue
         off = np.array([value.restitution.value - truth for value in known])
         errors = np.array([value.restitution.error for value in known])
         inside = [value.restitution.lower < truth < value.restitution.upper for value in known]
         cells += [
-            f'{len(known)} of {len(values)}, {np.median([v.contacts for v in known]):.0f} each',
+            f'{np.median([v.contacts for v in known]):.0f}'
+            + ('' if len(known) == len(values) else f' ({len(known)} of {len(values)} films)'),
             f'{off.mean():+.4f} ± {off.std(ddof=1) / np.sqrt(off.size):.4f}',
             f'{off.std(ddof=1):.4f}, {errors.mean():.4f}',
             f'{np.mean(inside):.2f}',
@@ -126,8 +127,8 @@ def row(name: str, results: list, truths: tuple[float, float]) -> str:
 def report(films: int = _FILMS) -> None:
     """Print a row for each kind of film."""
     print(
-        '| film | beads: films, contacts | bias | scatter, stated | 95 % holds | '
-        'walls: films, contacts | bias | scatter, stated | 95 % holds |'
+        '| film | collisions each | beads: bias | scatter, stated error | 95 % holds | '
+        'rebounds each | walls: bias | scatter, stated error | 95 % holds |'
     )
     print(f'{"| --- " * 9}|')
     settings = PipelineSettings()

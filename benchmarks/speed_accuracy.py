@@ -19,7 +19,7 @@ from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import Frame, SpeedEstimate, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_film import film
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 _NS = 1e9
 _SEEDS = range(1, 5)

@@ -30,7 +30,7 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from nanorocks_ros.settings import (
     with_values,
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.wire.flat_records import flat_value
 
 if TYPE_CHECKING:

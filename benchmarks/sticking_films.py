@@ -44,7 +44,7 @@ from nanorocks_ros.settings import (
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
 _FILMS, _CONTROLS = 12, 7

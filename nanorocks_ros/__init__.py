@@ -13,6 +13,7 @@ Everything in `__all__` is public and stable; it is loaded when it is first used
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.limits import bound_opencv
@@ -25,14 +26,16 @@ if TYPE_CHECKING:
     from nanorocks_ros.errors import RecordingError as RecordingError
     from nanorocks_ros.errors import SimulationError as SimulationError
     from nanorocks_ros.interface.analysis import analyse as analyse
-    from nanorocks_ros.interface.analysis_result import AnalysisResult as AnalysisResult
     from nanorocks_ros.interface.inputs import FilmDescription as FilmDescription
-    from nanorocks_ros.interface.measure_result import MeasureResult as MeasureResult
     from nanorocks_ros.interface.measuring import measure as measure
     from nanorocks_ros.interface.reading import read as read
+    from nanorocks_ros.interface.results.analysis_result import AnalysisResult as AnalysisResult
+    from nanorocks_ros.interface.results.measure_result import MeasureResult as MeasureResult
+    from nanorocks_ros.interface.results.simulation_result import (
+        SimulationResult as SimulationResult,
+    )
+    from nanorocks_ros.interface.results.tables_result import TablesResult as TablesResult
     from nanorocks_ros.interface.simulating import simulate as simulate
-    from nanorocks_ros.interface.simulation_result import SimulationResult as SimulationResult
-    from nanorocks_ros.interface.tables_result import TablesResult as TablesResult
     from nanorocks_ros.interface.tracking import TrackResult as TrackResult
     from nanorocks_ros.interface.tracking import track as track
 
@@ -60,17 +63,17 @@ __all__ = [
 ]
 
 _MODULES = {
-    'AnalysisResult': 'interface.analysis_result',
+    'AnalysisResult': 'interface.results.analysis_result',
     'ConfigurationError': 'errors',
     'FilmDescription': 'interface.inputs',
     'FitError': 'errors',
     'FrameError': 'errors',
-    'MeasureResult': 'interface.measure_result',
+    'MeasureResult': 'interface.results.measure_result',
     'NanorocksError': 'errors',
     'RecordingError': 'errors',
     'SimulationError': 'errors',
-    'SimulationResult': 'interface.simulation_result',
-    'TablesResult': 'interface.tables_result',
+    'SimulationResult': 'interface.results.simulation_result',
+    'TablesResult': 'interface.results.tables_result',
     'TrackResult': 'interface.tracking',
     'analyse': 'interface.analysis',
     'measure': 'interface.measuring',
@@ -87,7 +90,9 @@ if not TYPE_CHECKING:
     def __getattr__(name: str) -> object:
         """A public name, from its module."""
         if name not in _MODULES:
-            raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+            # With the module, Python names the attribute that comes nearest.
+            reason = f'module {__name__!r} has no attribute {name!r}'
+            raise AttributeError(reason, name=name, obj=sys.modules[__name__])
         from importlib import import_module
 
         value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)

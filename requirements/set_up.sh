@@ -2,9 +2,10 @@
 # Makes a virtual environment as a lock file says and installs this package into it; returns at
 # once when there is nothing to do. `make` calls it:
 #
-#   sh requirements/set_up.sh FOLDER LOCK [system]
+#   sh requirements/set_up.sh FOLDER LOCK [own|system] [dependencies]
 #
-# `system` lets the environment see the Python packages of the ROS 2 that is sourced.
+# `system` lets the environment see the Python packages of the ROS 2 that is sourced; with
+# `dependencies` this package is not installed yet, which two calls must not do at a time.
 # $PYTHON names the interpreter; without it the first that runs and is new enough is taken.
 set -eu
 unset _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONHOME
@@ -77,7 +78,7 @@ logged() {
 
 pip_install() {
     "$folder/bin/python" -m pip --disable-pip-version-check --no-input install \
-        --no-build-isolation "$@"
+        --no-build-isolation --no-compile "$@"
 }
 
 stored() { cat "$folder/$1" 2>/dev/null || true; }
@@ -105,9 +106,14 @@ if [ "$(stored dependencies)" != "$wanted" ]; then
     # The lock file names everything, so nothing is resolved: pip before 23.3 takes the newest
     # release of `coverage[toml]`, beside the locked one of `coverage`, and stops at its hash.
     logged "install $lock" pip_install --require-hashes --use-pep517 --no-deps -r "$lock"
+    # pip would keep one processor busy with it; what is for tests alone compiles what it imports.
+    # Templates of some packages are no Python.
+    [ "${4:-}" = dependencies ] ||
+        "$folder/bin/python" -m compileall -q -j 0 "$folder/lib" >>"$log" 2>&1 || true
     echo "$interpreter" >"$folder/interpreter"
     echo "$wanted" >"$folder/dependencies"
 fi
+[ "${4:-}" != dependencies ] || exit 0
 
 # The code itself runs from the source tree; copied are the metadata and what goes to lib/ and share/.
 installed='setup.py setup.cfg pyproject.toml package.xml nanorocks_ros/__init__.py resource scripts launch config foxglove rviz plotjuggler'

@@ -55,7 +55,7 @@ logged 'make the environment' "$python" -m venv "$folder/venv"
 # The versions of the lock file, without its hashes: the wheel made here has none.
 sed -n 's/^\([a-z0-9._-]*==[^\\]*[^ \\]\).*/\1/p' requirements/wheels.txt >"$folder/versions.txt"
 logged 'install the wheel' "$folder/venv/bin/python" -m pip --disable-pip-version-check install \
-    --only-binary :all: --constraint "$folder/versions.txt" "$folder"/dist/*.whl
+    --no-compile --only-binary :all: --constraint "$folder/versions.txt" "$folder"/dist/*.whl
 
 PATH=$folder/venv/bin:/usr/bin:/bin
 export PATH
@@ -77,6 +77,9 @@ CHECK
 set -x
 nanorocks --version
 nanorocks completion bash >completion.bash
+# At the first start each compiles other functions for most of a minute.
+nanorocks analyse "$root/bags/tray_1_sample" -o results &
+analysis=$!
 nanorocks simulate --tray 1 --duration 2 --video film.mp4 >simulate.txt
 nanorocks info film.mp4
-nanorocks analyse "$root/bags/tray_1_sample" -o results
+wait "$analysis"

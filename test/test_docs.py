@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import re
 
 import pytest
 from page_code import PAGES, ROOT
 
+import nanorocks_ros as nr
 from nanorocks_ros import records
 
 SUFFIXES = r'(_error|_errors|_lower|_upper|_68|_[xy]|_[12])*$'
 LINK = re.compile(r'(?<!`)\[[^\]]*\]\(([^)\s]+)\)')
+
+PACKAGE = ROOT / 'nanorocks_ros'
+# What makes the pages names them; it runs in the source tree alone.
+MAKERS = (PACKAGE / 'tools' / 'docs_pages', PACKAGE / 'nodes' / 'reference.py')
 
 
 def glossary():
@@ -47,6 +53,42 @@ def anchors(page):
     lines = page.read_text(encoding='utf-8').splitlines()
     headings = [line.lstrip('#').strip().lower() for line in lines if line.startswith('#')]
     return {re.sub(r'[^\w\- ]', '', heading).replace(' ', '-') for heading in headings}
+
+
+def told_texts(path):
+    """The texts of a module that users may see: all but docstrings and comments."""
+    tree = ast.parse(path.read_text(encoding='utf-8'))
+    bodies = [
+        node.body for node in ast.walk(tree) if isinstance(getattr(node, 'body', None), list)
+    ]
+    # A docstring, also of a constant, is an expression of its own.
+    unseen = {id(line.value) for body in bodies for line in body if isinstance(line, ast.Expr)}
+    return [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and id(node) not in unseen
+    ]
+
+
+def test_messages_name_no_page_which_an_installation_lacks():
+    modules = [
+        path
+        for path in PACKAGE.rglob('*.py')
+        if not any(path.is_relative_to(maker) for maker in MAKERS)
+    ]
+    texts = [(path, text) for path in modules for text in told_texts(path)]
+    texts += [(nr, getattr(nr, name).__doc__ or '') for name in nr.__all__]
+    installed = [
+        *PACKAGE.rglob('*.yaml'),
+        *(ROOT / 'config').iterdir(),
+        *(ROOT / 'launch').iterdir(),
+    ]
+    texts += [(path, path.read_text(encoding='utf-8')) for path in installed if path.is_file()]
+    assert len(texts) > 1000
+    page = re.compile(r'\bdocs/[\w/]*\w\.md|\b[a-z_]+\.md\b')
+    assert [(str(where), text) for where, text in texts if page.search(text)] == []
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))

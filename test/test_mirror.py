@@ -1,9 +1,10 @@
-"""Every module has a test file at the same place, or names the test that covers it."""
+"""Modules: each has a test at the same place or names it; names are unique, folders small."""
 
 from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'nanorocks_ros'
 TESTED_BY = re.compile(r'``(test/[\w/]+\.py)``')
 MODULES = sorted(path for path in PACKAGE.rglob('*.py') if path.name != '__init__.py')
+
+# "About fifteen", CONTRIBUTING.md.
+MOST_MODULES = 16
 
 
 def own_test(path: Path) -> Path:
@@ -45,6 +49,7 @@ def imported_modules(path: Path) -> frozenset[Path]:
     return frozenset(module for module in modules if module.is_file())
 
 
+@cache
 def reached_modules(path: Path) -> set[Path]:
     """Modules of the package that are loaded when a file is run."""
     reached: set[Path] = set()
@@ -69,3 +74,17 @@ def test_a_module_has_a_test_or_names_it(path):
         # Tests of nodes and commands start them as processes of their own.
         if not {'nodes', 'cli'} & set(path.relative_to(PACKAGE).parts[:1]):
             assert path in reached_modules(test), f'{where}: not reached by {test}'
+
+
+def test_no_two_modules_have_the_same_name():
+    names = Counter(path.name for path in MODULES)
+    twice = [path for path in MODULES if names[path.name] > 1]
+    assert not twice, [str(path.relative_to(ROOT)) for path in sorted(twice, key=lambda p: p.name)]
+
+
+def test_no_folder_holds_more_than_about_fifteen_modules():
+    folders = Counter(path.parent for path in MODULES)
+    large = {
+        str(f.relative_to(ROOT)): count for f, count in folders.items() if count > MOST_MODULES
+    }
+    assert not large

@@ -20,12 +20,12 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.yaml_limits import load_yaml
 from nanorocks_ros.inference.cluster_size.cluster_curve import load_curves
 from nanorocks_ros.inference.decay.decay_library_file import load_library
-from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.recordings.film.video import Video
 from nanorocks_ros.recordings.offered_qos import recorded_qos
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 from nanorocks_ros.studies.batch.batch_task import read_summary
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
 from nanorocks_ros.studies.sweeps.sweep_plan import Axis

@@ -41,8 +41,8 @@ Examples:
 def add_parser(commands: Any) -> None:
     """Add the command."""
     from nanorocks_ros.cli.analyse_batch import add_options
-    from nanorocks_ros.cli.film_inputs import accept_films
     from nanorocks_ros.cli.flags import add_bag
+    from nanorocks_ros.cli.imported_films import accept_films
 
     parser = commands.add_parser(
         'analyse',
@@ -78,7 +78,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Analyse one bag or many, print and write the results, and return the exit code."""
     from nanorocks_ros.cli.analyse_batch import is_batch, run_many
-    from nanorocks_ros.outputs.parquet import check_parquet
+    from nanorocks_ros.outputs.tables.parquet import check_parquet
 
     # Checked before hours of work.
     check_parquet(Path(f'tables.{options.format}'))
@@ -102,11 +102,14 @@ def _announce_films(options: argparse.Namespace, films: list[str]) -> None:
 
 def _run_one(options: argparse.Namespace) -> int:
     from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
     from nanorocks_ros.studies.analysis.recognition_verdicts import EXIT_NOT_USABLE
-    from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
-    from nanorocks_ros.studies.analysis.results_json import as_json
+    from nanorocks_ros.studies.analysis.results.results_folder import (
+        check_results_folder,
+        write_results,
+    )
+    from nanorocks_ros.studies.analysis.results.results_json import as_json
 
     source = Path(options.bags[0])
     folder = Path(options.output or f'{_stem(Path(options.named[0]))}_results')
@@ -161,7 +164,7 @@ def _scratch_folder() -> Path | None:
 
 
 def _print(analysis: Analysis, options: argparse.Namespace) -> None:
-    from nanorocks_ros.studies.analysis.tray_words import tray_lines
+    from nanorocks_ros.studies.analysis.results.tray_words import tray_lines
 
     lost = f', {analysis.frames_lost} lost' if analysis.frames_lost else ''
     print(f'{analysis.frames} frames{lost}, {analysis.seconds:.1f} s')

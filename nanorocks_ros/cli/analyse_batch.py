@@ -6,14 +6,11 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 from __future__ import annotations
 
 import json
-import math
-import sys
-import time
 from dataclasses import asdict
 from pathlib import Path
-from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.cli.batch_progress import BatchProgress
 from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.safe_text import counted, printable
@@ -23,14 +20,7 @@ if TYPE_CHECKING:
     import argparse
 
     from nanorocks_ros.studies.batch.batch_analysis import Batch
-    from nanorocks_ros.studies.batch.batch_store import BatchStore
-    from nanorocks_ros.studies.batch.batch_task import BagOutcome
     from nanorocks_ros.studies.batch.campaign_means import Combined, TrayMeans
-
-# Interval of updates of the progress bar, [s].
-_UPDATE_INTERVAL = 1.0
-# Interval of the lines that replace the bar outside a terminal, [s].
-_LINE_INTERVAL = 60.0
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -74,9 +64,9 @@ def run_many(options: argparse.Namespace) -> int:
     folder = Path(options.output)
     search = find_bags(options.bags)
     for text in search.left_out:
-        _notice(f'{printable(text)}; left out')
+        tell(f'{printable(text)}; left out')
     for error in search.missing.values():
-        _notice(printable(str(error)))
+        tell(printable(str(error)))
     if not search.bags:
         raise (
             ConfigurationError(
@@ -95,11 +85,11 @@ def run_many(options: argparse.Namespace) -> int:
         told=told_settings(options, options.parameters),
         statistics=options.statistics,
     )
-    with _BatchProgress() as progress:
+    with BatchProgress() as progress:
         batch = run_batch(plan, workers, progress)
     combined_results = combined(batch.counted, settings)
     for text in combined_results.notices:
-        _notice(text)
+        tell(text)
     report = write_batch(folder, batch, combined_results, settings, options.format)
     if options.json:
         values = {
@@ -110,7 +100,7 @@ def run_many(options: argparse.Namespace) -> int:
         print(json.dumps(values, allow_nan=False))
     else:
         _print(batch, combined_results, settings.prior)
-    _notice(f'results in {printable(folder)}, report in {printable(report)}')
+    tell(f'results in {printable(folder)}, report in {printable(report)}')
     unusable = _report_unusable(batch)
     return _report_failures(batch) or unusable
 
@@ -127,7 +117,7 @@ def _report_unusable(batch: Batch) -> int:
         if not verdict['usable']
     ]
     for text in texts:
-        _notice(text)
+        tell(text)
     return EXIT_NOT_USABLE if texts else 0
 
 
@@ -136,9 +126,9 @@ def _report_failures(batch: Batch) -> int:
         return 0
     for failure in batch.failed:
         part = ' (the part that could be analysed is in the results)' if failure.analysed else ''
-        _notice(f'failed: {failure.reason}{part}')
+        tell(f'failed: {failure.reason}{part}')
     total = len(batch.results) + sum(not failure.analysed for failure in batch.failed)
-    _notice(
+    tell(
         f'{len(batch.failed)} of {total} recordings failed, as listed; repair or remove them, '
         'and run the same command again: finished recordings are kept'
     )
@@ -146,7 +136,7 @@ def _report_failures(batch: Batch) -> int:
 
 
 def _as_json(batch: Batch, combined_results: Combined, prior: PriorSettings) -> dict[str, Any]:
-    from nanorocks_ros.studies.batch.campaign_means import means_as_json
+    from nanorocks_ros.studies.batch.means_json import means_as_json
 
     return {
         'bags': [
@@ -197,7 +187,7 @@ def _print(batch: Batch, combined_results: Combined, prior: PriorSettings) -> No
 
 def _tray_lines(tray: TrayMeans) -> list[str]:
     from nanorocks_ros.records import Quality, headline_in_words
-    from nanorocks_ros.studies.batch.campaign_means import means_as_json
+    from nanorocks_ros.studies.batch.means_json import means_as_json
 
     values = means_as_json(tray)
 
@@ -252,87 +242,3 @@ def _interval(values: tuple[float | None, ...], factor: float, digits: int) -> s
         'unknown' if value is None else f'{factor * value:.{digits}f}' for value in values
     )
     return f'{middle} [{low}, {high}]'
-
-
-def _notice(text: str) -> None:
-    tell(text)
-
-
-class _BatchProgress:
-    """Recordings, frame rate and time left: a bar on a terminal, lines elsewhere."""
-
-    def __init__(self) -> None:
-        self._over = Event()
-        self._bar: Any = None
-        self._watcher: Thread | None = None
-
-    def __enter__(self) -> _BatchProgress:
-        return self
-
-    def begin(self, store: BatchStore, sizes: dict[str, int], done: int) -> None:
-        """Start the display; `sizes` are the bytes of each recording left to do."""
-        from tqdm import tqdm
-
-        self._store, self._left = store, {name: max(size, 1) for name, size in sizes.items()}
-        self._bytes, self._frames, self._failed = sum(self._left.values()), 0, 0
-        self._done, self._all = done, done + len(sizes)
-        self._start = time.monotonic()
-        if done:
-            _notice(f'{done} of {self._all} recordings are finished and unchanged')
-        self._bar = tqdm(
-            total=1.0,
-            disable=None,
-            leave=False,
-            bar_format='{desc} |{bar}|',
-        )
-        self._watcher = Thread(target=self._watch, daemon=True)
-        self._watcher.start()
-
-    def finished(self, name: str, outcome: BagOutcome) -> None:
-        """Count a recording that is finished or failed."""
-        from tqdm import tqdm
-
-        from nanorocks_ros.studies.batch.batch_task import DONE
-
-        self._left.pop(name, None)
-        self._frames += outcome.frames
-        self._done += 1
-        if outcome.state != DONE:
-            self._failed += 1
-            with tqdm.external_write_mode(file=sys.stderr):
-                _notice(outcome.reason)
-
-    def notice(self, text: str) -> None:
-        """Print one message for the user."""
-        _notice(text)
-
-    def _watch(self) -> None:
-        last = time.monotonic()
-        while not self._over.wait(_UPDATE_INTERVAL):
-            part, text = self._status()
-            self._bar.n = part
-            self._bar.set_description_str(text)
-            if self._bar.disable and time.monotonic() - last >= _LINE_INTERVAL:
-                last = time.monotonic()
-                _notice(text)
-
-    def _status(self) -> tuple[float, str]:
-        frames, left = self._frames, dict(self._left)
-        for name, (done, total) in self._store.under_way().items():
-            if name in left:
-                frames += done
-                left[name] = round(left[name] * (1.0 - done / max(total, done, 1)))
-        part = 1.0 - sum(left.values()) / max(self._bytes, 1)
-        seconds = time.monotonic() - self._start
-        left_s = seconds * (1.0 / part - 1.0) if part > 0.0 else math.inf
-        when = f'{math.ceil(left_s / 60.0)} min left' if part > 0.0 else 'starting'
-        failed = f', {self._failed} failed' if self._failed else ''
-        counts = f'{self._done} of {self._all} recordings'
-        return part, f'{counts}, {frames / seconds:.0f} frames/s, {when}{failed}'
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        if self._watcher is not None:
-            self._watcher.join()
-        if self._bar is not None:
-            self._bar.close()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 
-from nanorocks_ros.cli.film_inputs import accept_films
+from nanorocks_ros.cli.imported_films import accept_films
 from nanorocks_ros.cli.parsing.command_parser import offer
 from nanorocks_ros.cli.parsing.tray_options import add_tray_or_file, not_a_number
 from nanorocks_ros.errors import ConfigurationError

@@ -32,29 +32,29 @@ COMMANDS = {
         'track': 'films.track',
         'analyse': 'analyse',
         'statistics': 'statistics',
-        'speeds': 'speeds',
-        'autocorrelation': 'autocorrelation',
+        'speeds': 'inspection.speeds',
+        'autocorrelation': 'inspection.autocorrelation_sizes',
     },
     'simulate': {
         'simulate': 'simulation.simulate',
         'sweep': 'simulation.sweep',
         'library': 'calibration.library',
-        'cluster-curve': 'calibration.cluster_curve',
+        'cluster-curve': 'calibration.calibrate_clusters',
         'reproduce': 'reproduce',
     },
     'draw': {
         'figure': 'figures.figure',
-        'look': 'look',
+        'look': 'inspection.look',
     },
     'prepare recordings': {
         'import': 'recordings.import_video',
         'info': 'recordings.info',
-        'salvage': 'recordings.salvage',
+        'salvage': 'recordings.salvage_bag',
         'calibrate': 'calibration.calibrate',
         'calibrate-area': 'calibration.calibrate_area',
     },
     'look after the machine': {
-        'dashboard': 'dashboard',
+        'dashboard': 'live_page',
         'doctor': 'doctor',
         'completion': 'parsing.completion',
     },
@@ -131,7 +131,7 @@ def _set_up() -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from nanorocks_ros.cli.film_inputs import use_imports
+    from nanorocks_ros.cli.imported_films import use_imports
 
     use_imports(options)
     code: int = options.run(options)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable
 
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.reproduction.campaign_plan import CampaignPlan
 
 _TEXT = 'simulate the campaign, analyse its films, and report every figure and table of the paper'
@@ -118,7 +118,7 @@ class _Bars:
 
     def progress(self, name: str, done: float) -> None:
         """Show the part of a chapter that is done, 0 to 1."""
-        from nanorocks_ros.cli.progress import Progress
+        from nanorocks_ros.cli.progress_bar import Progress
 
         if self._bar is None or self._bar[0] != name:
             self._close()

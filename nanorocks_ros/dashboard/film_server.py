@@ -23,7 +23,7 @@ from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
 try:
     from aiohttp import web
 
-    from nanorocks_ros.dashboard.site import make_site
+    from nanorocks_ros.dashboard.routes import make_site
 except ImportError as error:
     raise DashboardError(
         'the page of a film', 'needs aiohttp', "install it: pip install 'nanorocks_ros[dashboard]'"

@@ -28,7 +28,7 @@ try:
     from aiohttp import WSMsgType, web
     from aiohttp.http_exceptions import HttpProcessingError
 
-    from nanorocks_ros.dashboard.site import LIVE, make_site
+    from nanorocks_ros.dashboard.routes import LIVE, make_site
 except ImportError as error:
     raise DashboardError(
         'the live page', 'needs aiohttp', "install it: pip install 'nanorocks_ros[dashboard]'"

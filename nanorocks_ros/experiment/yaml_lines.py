@@ -6,6 +6,7 @@ Tested by ``test/experiment/test_trays.py``.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,12 @@ def read_text(path: Path, expected: str) -> str:
         raise ConfigurationError(str(path), reason, near or f'name {expected}') from error
 
 
+@lru_cache(maxsize=1000)
+def _parsed(text: str) -> Any:
+    """The value of plain text. To parse the words of the trays that flew takes most of a load."""
+    return yaml.safe_load(text)
+
+
 class YamlLines:
     """Reads YAML nodes; every error names the file and the line.
 
@@ -152,7 +159,7 @@ class YamlLines:
             raise self.error(node, 'expected a single value', 'correct this line')
         try:
             # Of plain text the compiled parser gives an empty style.
-            value = node.value if node.style else yaml.safe_load(node.value)
+            value = node.value if node.style else _parsed(node.value)
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             raise self.error(node, f'{node.value[:40]!r} cannot be read', 'correct it') from error
         if isinstance(value, dict | list | set):

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.experiment.film_section import film_section
 from nanorocks_ros.experiment.plate import Region
-from nanorocks_ros.interface.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.interface.inputs import named_paths, recording, settings_of, told_settings
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
+from nanorocks_ros.interface.results.analysis_result import AnalysedRecording, AnalysisResult
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
@@ -49,8 +49,8 @@ def analyse(
     trays_file : path, optional
         YAML file of trays other than those that flew.
     settings : mapping, optional
-        Settings by their names, such as ``{'cooling.duration': 15}``; see
-        docs/reference/parameters.md.
+        Settings by their names, such as ``{'cooling.duration': 15}``;
+        ``nanorocks analyse --help-all`` lists them.
     image_topic : str, optional
         The camera's topic if it has another name than that of our nodes.
     keep_tracks : bool

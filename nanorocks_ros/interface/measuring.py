@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.interface.inputs import described, told_settings
-from nanorocks_ros.interface.measure_result import MeasureResult
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
+from nanorocks_ros.interface.results.measure_result import MeasureResult
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.outputs.named_recordings import with_film, with_recording
 from nanorocks_ros.studies.film_import.film_cache import cache_folder

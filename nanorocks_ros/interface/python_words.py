@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # A word of a flag; what follows a flag of a command in backquotes stays as it is.
 _FLAG = re.compile(r'(?<![\w`-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)')
-_COMMAND = re.compile(r'(`[^`]*`)')
+_COMMAND = re.compile(r'(`[^`]*`|\bnanorocks [a-z][^;`]*)')
 # Of flags that have another name in Python.
 _OTHERS = {
     'start': '--start of `nanorocks import`',
@@ -27,11 +27,11 @@ _OTHERS = {
 def python_words(text: str) -> str:
     """The text with keywords and settings in place of flags: ``height_mm`` for ``--height-mm``.
 
-    Commands in backquotes are left as they are.
+    Commands are left as they are: in backquotes, or from ``nanorocks`` to the next semicolon.
     """
     parts = _COMMAND.split(text)
     return ''.join(
-        part if part.startswith('`') else _FLAG.sub(lambda flag: _keyword(flag[1]), part)
+        part if _COMMAND.fullmatch(part) else _FLAG.sub(lambda flag: _keyword(flag[1]), part)
         for part in parts
     )
 

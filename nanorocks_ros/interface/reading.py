@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
-from nanorocks_ros.interface.analysis_reading import analysis_of
-from nanorocks_ros.interface.measure_result import MeasureResult
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.interface.record_frames import table_frame
+from nanorocks_ros.interface.results.analysis_reading import analysis_of
+from nanorocks_ros.interface.results.measure_result import MeasureResult
+from nanorocks_ros.interface.results.tables_result import TablesResult
 from nanorocks_ros.interface.table_reading import TABLES, described_tables, read_frame, run_of
-from nanorocks_ros.interface.tables_result import TablesResult
 from nanorocks_ros.outputs.json_values import parse_object
 from nanorocks_ros.recordings.bag.bag_folder import METADATA
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
@@ -28,8 +28,8 @@ from nanorocks_ros.studies.sweeps.sweep_result import Sweep
 if TYPE_CHECKING:
     import pandas as pd
 
-    from nanorocks_ros.interface.analysis_result import AnalysisResult
     from nanorocks_ros.interface.inputs import PathLike
+    from nanorocks_ros.interface.results.analysis_result import AnalysisResult
 
 
 def read(path: PathLike) -> AnalysisResult | MeasureResult | TablesResult:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
     from nanorocks_ros.records import ArrayRecord
 
 

@@ -9,7 +9,7 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
 from nanorocks_ros.interface.progress_bars import count_bar, part_bar
 from nanorocks_ros.interface.python_words import in_python
-from nanorocks_ros.interface.simulation_result import SimulationResult
+from nanorocks_ros.interface.results.simulation_result import SimulationResult
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.settings import SimulationSettings, with_values
 from nanorocks_ros.studies.synthetic.film_video import VIDEOS
@@ -67,7 +67,7 @@ def simulate(
         As of `analyse`.
     **settings
         Of the simulation, such as ``restitution=0.89``, ``wall_restitution=0.97`` or ``seed=1``;
-        see docs/reference/parameters.md.
+        ``nanorocks simulate --help-all`` lists them.
 
     Returns
     -------

@@ -12,8 +12,8 @@ import pandas as pd
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.limits import require_regular_file
 from nanorocks_ros.outputs.json_values import parse_object, read_object
-from nanorocks_ros.outputs.parquet import read_parquet, read_parquet_schema
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.parquet import read_parquet, read_parquet_schema
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

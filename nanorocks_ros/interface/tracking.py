@@ -14,12 +14,12 @@ from nanorocks_ros.interface.inputs import described, told_settings
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.interface.record_frames import table_frame
-from nanorocks_ros.interface.result import Result, Summary
+from nanorocks_ros.interface.results.result import Result, Summary
 from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import TWO_COLUMNS
 from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
-from nanorocks_ros.studies.analysis.tracks_files import columns_of, track_pieces
+from nanorocks_ros.studies.analysis.results.tracks_files import columns_of, track_pieces
 from nanorocks_ros.studies.inspection.track_overlay import overlay
 
 if TYPE_CHECKING:

@@ -10,8 +10,12 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, RecordingError
+from nanorocks_ros.nodes.base.communication.ros_messages import (
+    compressed_message,
+    image_message,
+    time_message,
+)
 from nanorocks_ros.nodes.base.node import NanorocksNode
-from nanorocks_ros.nodes.base.ros_messages import compressed_message, image_message, time_message
 from nanorocks_ros.nodes.sources.bag_publishers import BagPublishers, stamp_in
 from nanorocks_ros.nodes.sources.bag_source import path_of_bag
 from nanorocks_ros.nodes.sources.play_range import PlayRange

@@ -119,7 +119,7 @@ class DemoNode(NanorocksNode):
         print(
             f'walls {final.wall_restitution.value:.3f} [{final.wall_restitution.lower:.3f}, '
             f"{final.wall_restitution.upper:.3f}]; the paper's closed form says "
-            f'{final.paper_restitution:.3f}; from {source}; see docs/method/restitution.md'
+            f'{final.paper_restitution:.3f}; from {source}'
         )
         print(f'figure: {_FIGURE.resolve()}', flush=True)
 

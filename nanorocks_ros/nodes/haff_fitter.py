@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.nodes.base.communication.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import CYCLE_GOES_ON
 from nanorocks_ros.nodes.base.told_settings import default_settings
-from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.open_trays import estimator_of

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from nanorocks_ros import settings as st
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated
+from nanorocks_ros.nodes.base.communication.result_topics import RESULT_TOPICS
+from nanorocks_ros.nodes.base.communication.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.base.problems import Level, Problem
-from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
 from nanorocks_ros.nodes.base.told_settings import default_settings
-from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.sources.bag_source import (
     open_bag_frames,
     recorded_moments,

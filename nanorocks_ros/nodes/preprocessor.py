@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nanorocks_ros.nodes.base.communication.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.base.told_settings import default_settings
-from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.sources.camera_subscription import CameraSubscription
 from nanorocks_ros.pipeline.changed_settings import Part, changed_parts
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.pipeline.warm_up import warm_up
 from nanorocks_ros.settings import CameraSettings, PipelineSettings
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:

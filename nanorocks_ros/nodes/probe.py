@@ -40,7 +40,7 @@ def _import_ros() -> Answer:
     import sensor_msgs.msg
     import std_msgs.msg
 
-    from nanorocks_ros.nodes.base.typed_messages import typed_problem
+    from nanorocks_ros.nodes.base.communication.typed_messages import typed_problem
 
     packages = (rclpy, diagnostic_msgs, sensor_msgs, std_msgs)
     rclpy.shutdown()
@@ -56,7 +56,7 @@ def _receive(topic: str, count: int) -> Answer:
     """Count frames until all have arrived, or the deadline has passed."""
     from rclpy.node import Node
 
-    from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
+    from nanorocks_ros.nodes.base.communication.ros_messages import message_class, qos_of
     from nanorocks_ros.wire import topics
 
     node = Node('doctor_receiver')
@@ -80,7 +80,11 @@ def _send(topic: str, count: int) -> Answer:
     from rclpy.duration import Duration
     from rclpy.node import Node
 
-    from nanorocks_ros.nodes.base.ros_messages import image_message, message_class, qos_of
+    from nanorocks_ros.nodes.base.communication.ros_messages import (
+        image_message,
+        message_class,
+        qos_of,
+    )
     from nanorocks_ros.wire import topics
 
     node = Node('doctor_sender')
@@ -157,7 +161,7 @@ def _of_others(node: Node, endpoints: Sequence[TopicEndpointInfo]) -> list[Topic
 
 
 def _describe(endpoint: TopicEndpointInfo) -> Answer:
-    from nanorocks_ros.nodes.base.ros_messages import node_name_of
+    from nanorocks_ros.nodes.base.communication.ros_messages import node_name_of
 
     profile = endpoint.qos_profile
     return {
@@ -171,7 +175,7 @@ def _mismatches(
     publishers: Sequence[TopicEndpointInfo], subscriptions: Sequence[TopicEndpointInfo]
 ) -> list[Answer]:
     """Publisher, subscription and reason of each pair that does not match."""
-    from nanorocks_ros.nodes.base.ros_messages import node_name_of
+    from nanorocks_ros.nodes.base.communication.ros_messages import node_name_of
 
     pairs = []
     for publisher in publishers:
@@ -193,7 +197,7 @@ def _mismatches(
 
 def _offered(publisher: TopicEndpointInfo, subscription: TopicEndpointInfo) -> dict[str, str]:
     """What a subscription would have to request, by policy."""
-    from nanorocks_ros.nodes.base.qos_compatibility import mismatches
+    from nanorocks_ros.nodes.base.communication.qos_compatibility import mismatches
 
     pairs = mismatches([publisher.qos_profile], [subscription.qos_profile])
     return {pair.policy: pair.offered.lower() for pair in pairs}

@@ -14,7 +14,7 @@ import numba
 from numba import extending
 from numba.core import event
 
-from nanorocks_ros.numerics.kernel_cache import SharedCache
+from nanorocks_ros.numerics.compilation.kernel_cache import SharedCache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,8 +31,8 @@ _OPTIONS = {'error_model': 'numpy', 'nogil': True}
 # its own way, which takes twice as long and gives the same numbers.
 _IS_LEAN = (0, 59) <= numba.version_info.short < (0, 69)
 if _IS_LEAN:
-    from nanorocks_ros.numerics.kernel_loading import use_kernel_cache
-    from nanorocks_ros.numerics.lean_compilation import compile_lean
+    from nanorocks_ros.numerics.compilation.kernel_loading import use_kernel_cache
+    from nanorocks_ros.numerics.compilation.lean_compilation import compile_lean
 
 Function = TypeVar('Function', bound='Callable[..., Any]')
 

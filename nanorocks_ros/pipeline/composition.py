@@ -35,7 +35,7 @@ from nanorocks_ros.stages.contact_restitution.contact_estimator import (
     ContactEstimator,
     ContactInput,
 )
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.restitution.restitution_estimator import (
     RestitutionEstimator,
     RestitutionInput,

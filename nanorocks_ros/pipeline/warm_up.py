@@ -24,7 +24,7 @@ from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
 from nanorocks_ros.stages.contacts.contact_finder import ContactFinder
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 

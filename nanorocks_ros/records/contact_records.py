@@ -96,6 +96,7 @@ class PairCollision:
     tray, cycle : int
     tracks, species : ndarray of int32, (2,)
     radii, masses : ndarray (2,), [m], [kg]
+        Radii as they show, in the scale of the distances.
     radius_errors : ndarray (2,), [m]
         0 where all beads of the species are alike.
     before, after : ndarray (2, 2), [m/s]

@@ -3,7 +3,7 @@
 The terminal, the JSON of `nanorocks analyse`, reports and the live page take their words from
 here.
 
-Tested by ``test/studies/analysis/test_cycle_words.py``.
+Tested by ``test/studies/analysis/results/test_cycle_words.py``.
 """
 
 from __future__ import annotations
@@ -156,8 +156,7 @@ def flags_in_words(quality: Quality) -> list[FlagWords]:
     for flag in Quality:
         if flag in quality and flag.name:
             name = flag.name.lower()
-            known = FLAGS.get(flag, Words(name.replace('_', ' '), 'see docs/reference/flags.md'))
-            words.append(FlagWords(name, *known))
+            words.append(FlagWords(name, *FLAGS[flag]))
     return words
 
 

@@ -36,6 +36,8 @@ from nanorocks_ros.settings.scene_settings import (
     SceneSettings,
 )
 from nanorocks_ros.settings.setting_fields import (
+    IN_RANGE,
+    SETTINGS_LISTED,
     Bounds,
     Scalar,
     SettingRow,
@@ -51,6 +53,8 @@ from nanorocks_ros.settings.setting_fields import (
 from nanorocks_ros.settings.simulation_settings import FilmSettings, SimulationSettings
 
 __all__ = [
+    'IN_RANGE',
+    'SETTINGS_LISTED',
     'BagSettings',
     'BodySettings',
     'Bounds',

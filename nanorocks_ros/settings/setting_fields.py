@@ -21,6 +21,13 @@ Value = Scalar | tuple[int, ...] | tuple[float, ...]
 SettingsType = TypeVar('SettingsType')
 ValueType = TypeVar('ValueType')
 
+# What to do about a setting that does not exist, and about a value that is not allowed.
+SETTINGS_LISTED = (
+    '`nanorocks analyse --help-all` lists the settings of a measurement, `nanorocks simulate '
+    '--help-all` those of a simulation'
+)
+IN_RANGE = 'give values of this type and range'
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
@@ -233,15 +240,15 @@ def with_values(settings: SettingsType, values: Mapping[str, Any], where: str) -
     known = {row.name: row for row in rows(settings)}
     # The group may be left out.
     near = {name.rpartition('.')[2]: name for name in known} | {name: name for name in known}
-    problems = [f'no setting {name!r}{_hint(name, near)}' for name in values if name not in known]
+    unknown = [name for name in values if name not in known]
+    problems = [f'no setting {name!r}{_hint(name, near)}' for name in unknown]
     for name, value in values.items():
         text = problem(known[name], value) if name in known else None
         if text:
             problems.append(f'{name}: {text}')
     if problems:
-        raise ConfigurationError(
-            where, '; '.join(problems), 'see docs/reference/parameters.md for names and ranges'
-        )
+        remedy = SETTINGS_LISTED if unknown else IN_RANGE
+        raise ConfigurationError(where, '; '.join(problems), remedy)
     changed: SettingsType = _replaced(
         settings, {name: coerced(known[name], value) for name, value in values.items()}
     )

@@ -15,7 +15,7 @@ from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.simulation.engine import observables as columns
 from nanorocks_ros.simulation.engine.event_loop import run_until
-from nanorocks_ros.simulation.engine.flight.rigid_motion import new_motions
+from nanorocks_ros.simulation.engine.flight.turning_motion import new_motions
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, new_state
 from nanorocks_ros.simulation.engine.input_checks import (

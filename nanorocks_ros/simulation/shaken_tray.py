@@ -12,7 +12,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError, SimulationError
 from nanorocks_ros.numerics.counter_rng import Purpose, key_for
 from nanorocks_ros.records import GroundTruth
-from nanorocks_ros.settings import problem, rows
+from nanorocks_ros.settings import IN_RANGE, problem, rows
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.event_counts import EventCounts
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
@@ -284,6 +284,4 @@ def check_settings(settings: SimulationSettings) -> None:
     problems = ((row.name, problem(row, row.default)) for row in rows(settings))
     wrong = [f'{name}: {text}' for name, text in problems if text]
     if wrong:
-        raise ConfigurationError(
-            'simulation', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'
-        )
+        raise ConfigurationError('simulation', '; '.join(wrong), IN_RANGE)

@@ -13,7 +13,7 @@ from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
-from nanorocks_ros.studies.analysis.results_folder import trays_file_of
+from nanorocks_ros.studies.analysis.results.results_folder import trays_file_of
 
 OWN_TRAY = """\
 # as glued in May

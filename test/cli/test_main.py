@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -59,3 +61,16 @@ def test_line_ends_and_control_sequences_in_a_name_stay_on_one_line(tmp_path, ca
     assert command.main(['info', str(tmp_path / 'a\n\x1b[2Jb.mcap')]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert r'a\n\x1b[2Jb.mcap: does not exist; ' in line
+
+
+def test_the_help_loads_no_large_library():
+    program = (
+        'import sys; from nanorocks_ros.cli.main import build_parser; build_parser(); '
+        'print(*sys.modules)'
+    )
+    run = subprocess.run(
+        [sys.executable, '-c', program], cwd=SAMPLE.parents[1], capture_output=True, check=True
+    )
+    loaded = set(run.stdout.decode().split())
+    assert 'nanorocks_ros.cli.recordings.info' in loaded
+    assert not loaded & {'cv2', 'matplotlib', 'numba', 'numpy', 'pandas', 'scipy', 'tqdm'}

@@ -13,6 +13,7 @@ from nanorocks_ros.records import CorStatus, Interval, Measured, MeasuredInterva
 from nanorocks_ros.settings import PriorSettings, priors_in_words
 
 WIDE = {'width': 1440, 'height': 900}
+TABLET = {'width': 768, 'height': 1024}
 PHONE = {'width': 390, 'height': 844}
 NARROW = {'width': 320, 'height': 568}
 TOKEN = 'correct-horse-battery'
@@ -264,7 +265,9 @@ def test_changes_are_said_to_those_who_listen(look, full, results):
     assert page.locator('#link').get_attribute('role') == 'status'
 
 
-@pytest.mark.parametrize('size', [WIDE, PHONE, NARROW], ids=['wide', 'phone', 'narrow'])
+@pytest.mark.parametrize(
+    'size', [WIDE, TABLET, PHONE, NARROW], ids=['wide', 'tablet', 'phone', 'narrow']
+)
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
     values = [('tray 1 COR', '0.9'), ('priors', priors_in_words(PriorSettings()))]
@@ -286,6 +289,15 @@ def test_text_is_readable_and_nothing_sticks_out(look, full, scheme, size):
     wider = page.evaluate('document.documentElement.scrollWidth - innerWidth')
     assert wider <= 0
     assert page.evaluate(OVERFLOWING) == []
+
+
+@pytest.mark.parametrize('size', [WIDE, TABLET], ids=['wide', 'tablet'])
+def test_the_captions_of_plots_side_by_side_have_one_line(look, full, size):
+    page = look(full.url, viewport=size)
+    text_is(page, '#cor', 'final')
+    lines = page.locator('#cor-chart figcaption, #cluster-chart figcaption')
+    heights = [lines.nth(number).bounding_box()['height'] for number in range(2)]
+    assert heights[0] == heights[1] < 40.0
 
 
 def test_texts_from_outside_stay_texts(look, serve, results):

@@ -50,6 +50,12 @@ def test_every_public_name_is_there_and_documented():
             assert value.__module__.startswith('nanorocks_ros.')
 
 
+def test_a_misspelt_name_is_answered_with_the_nearest():
+    program = [sys.executable, '-c', 'import nanorocks_ros as nr; nr.anlyse']
+    run = subprocess.run(program, cwd=ROOT, capture_output=True, text=True)
+    assert "Did you mean: 'analyse'?" in run.stderr
+
+
 def test_type_checkers_see_the_names_that_are_loaded():
     tree = ast.parse((ROOT / 'nanorocks_ros/__init__.py').read_text('utf-8'))
     (block,) = (

@@ -6,6 +6,7 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.interface.python_words import in_python, python_words
+from nanorocks_ros.settings import SETTINGS_LISTED
 
 
 @pytest.mark.parametrize(
@@ -15,6 +16,8 @@ from nanorocks_ros.interface.python_words import in_python, python_words
         ('raise it: --tracking-max-speed 3', 'raise it: tracking.max_speed 3'),
         ('pass --include-inconsistent', 'pass cooling.include_inconsistent'),
         ('run `nanorocks look BAG --at 3`', 'run `nanorocks look BAG --at 3`'),
+        (SETTINGS_LISTED, SETTINGS_LISTED),
+        ('nanorocks tray FILM --rate 3; or --rate', 'nanorocks tray FILM --rate 3; or rate'),
         ('pass --start', 'pass --start of `nanorocks import`'),
         ('a -- b, 1--2', 'a -- b, 1--2'),
         ('lower --prior-min-wall-restitution', 'lower prior.min_wall_restitution'),

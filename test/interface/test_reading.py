@@ -10,8 +10,8 @@ import pytest
 
 import nanorocks_ros as nr
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import PACKAGE, write_package, write_table
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import PACKAGE, write_package, write_table
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
 from nanorocks_ros.studies.sweeps.sweep_runs import sweep

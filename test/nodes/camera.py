@@ -6,7 +6,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 
-from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message, qos_of
 from nanorocks_ros.wire import topics
 
 

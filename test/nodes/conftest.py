@@ -16,6 +16,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 import rclpy
+from forked_nodes import ForkedNode
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -76,26 +77,38 @@ class Graph:
     node: Node
     executor: SingleThreadedExecutor
     folder: str
-    _running: list[tuple[subprocess.Popen, str]] = field(default_factory=list)
+    _running: list[tuple[subprocess.Popen | ForkedNode, str]] = field(default_factory=list)
 
     def start(self, name, *parameters, arguments=()):
-        """Start a node; parameters as ``name:=value``."""
-        path = os.path.join(self.folder, f'{name}_{len(self._running)}.log')
-        command = [sys.executable, '-m', 'nanorocks_ros.nodes', name, '--ros-args', *arguments]
-        for parameter in parameters:
-            command += ['-p', parameter]
-        environment = dict(
-            os.environ,
-            ROS_DOMAIN_ID=str(self.domain),
-            ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
-            PYTHONUNBUFFERED='1',
-        )
+        """Start a node, without the time that imports take; parameters as ``name:=value``."""
+        words, environment, path = self._call(name, parameters, arguments)
+        process = ForkedNode(words, environment, path)
+        self._running.append((process, path))
+        return process
+
+    def start_program(self, name, *parameters, arguments=()):
+        """Start a node as a user does: where its command line or its imports matter."""
+        words, environment, path = self._call(name, parameters, arguments)
+        command = [sys.executable, '-m', 'nanorocks_ros.nodes', *words]
         with open(path, 'wb') as log:
             process = subprocess.Popen(
                 command, env=environment, stdout=log, stderr=subprocess.STDOUT
             )
         self._running.append((process, path))
         return process
+
+    def _call(self, name, parameters, arguments):
+        """Words and environment of a node, and the file of what it prints."""
+        words = [name, '--ros-args', *arguments]
+        for parameter in parameters:
+            words += ['-p', parameter]
+        environment = dict(
+            os.environ,
+            ROS_DOMAIN_ID=str(self.domain),
+            ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
+            PYTHONUNBUFFERED='1',
+        )
+        return words, environment, os.path.join(self.folder, f'{name}_{len(self._running)}.log')
 
     def output(self, process):
         """What a node has printed so far."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of
 from nanorocks_ros.records import (
     ClusterEstimate,
     CorEstimate,

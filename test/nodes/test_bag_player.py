@@ -20,7 +20,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of, stamp_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of, stamp_of
 from nanorocks_ros.recordings.bag.offered_topics import OfferedTopic
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter

@@ -17,7 +17,7 @@ pytest.importorskip('rclpy')
 
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of
 from nanorocks_ros.records import CorEstimate, CorStatus
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array

@@ -18,7 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message, qos_of
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 

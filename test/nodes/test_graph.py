@@ -26,9 +26,9 @@ def listening_to(graph, topic, count=1):
 def test_a_bag_through_separate_nodes_gives_the_same_numbers_as_offline(graph):
     """And a subscriber that comes when all is over still gets the final restitution."""
     arrays = ResultArrays(graph.node)
-    stages = [graph.start(name) for name in STAGES]
+    stages = [graph.start_program(name) for name in STAGES]
     listening_to(graph, topics.SPEED, 2)
-    player = graph.start('bag_player', f'bag:={SAMPLE}', 'rate:=0.0', 'listeners:=3')
+    player = graph.start_program('bag_player', f'bag:={SAMPLE}', 'rate:=0.0', 'listeners:=3')
     finished = graph.wait(player)
     assert finished.code == 0, finished.output
     graph.until(lambda: arrays.final_cors())
@@ -48,11 +48,11 @@ def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
     arrays = ResultArrays(graph.node)
     diagnostics = []
     graph.node.create_subscription(DiagnosticArray, '/diagnostics', diagnostics.append, 10)
-    stages = [graph.start(name) for name in STAGES]
+    stages = [graph.start_program(name) for name in STAGES]
     listening_to(graph, topics.GRAY, 2)
     listening_to(graph, topics.RAW)
     small = ('width_px:=240', 'height_px:=240', 'first_shake:=0.5', 'rate:=0.0')
-    simulator = graph.start('simulator', *small, 'listeners:=3', 'duration:=9.0')
+    simulator = graph.start_program('simulator', *small, 'listeners:=3', 'duration:=9.0')
     assert graph.wait(simulator).code == 0
     graph.until(lambda: arrays.messages[CorEstimate])
     truth = arrays.records(GroundTruth)

@@ -16,7 +16,11 @@ pytest.importorskip('rclpy')
 from sensor_msgs.msg import CompressedImage, Image
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.nodes.base.ros_messages import compressed_message, qos_of, stamp_of
+from nanorocks_ros.nodes.base.communication.ros_messages import (
+    compressed_message,
+    qos_of,
+    stamp_of,
+)
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.image_messages import encode_jpeg
 from nanorocks_ros.records import ClusterEstimate

@@ -20,8 +20,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float32MultiArray, String
 
-from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
-from nanorocks_ros.nodes.base.typed_messages import typed_problem
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message, qos_of
+from nanorocks_ros.nodes.base.communication.typed_messages import typed_problem
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 
@@ -64,7 +64,7 @@ def test_what_does_not_connect_is_listed_and_the_advice_connects_it(graph):
     graph.node.create_subscription(Float32MultiArray, 'tray_3/cor', print, RELIABLE)
     graph.node.create_publisher(String, 'tray_4/speed', RELIABLE)
     graph.node.create_publisher(Time, 'epoch', RELIABLE)
-    node = graph.start('cluster_autocorrelator', 'trays:=[1, 4]')
+    node = graph.start_program('cluster_autocorrelator', 'trays:=[1, 4]')
     graph.until(lambda: 'publishes std_msgs/msg/String' in graph.output(node))
     code, checks = doctor(graph, '--graph')
     assert code == 1
@@ -91,7 +91,7 @@ def test_what_does_not_connect_is_listed_and_the_advice_connects_it(graph):
     ]
     assert len(advised) == 2
     (rename,) = re.findall(r'-r (\S+:=/\w+)', other_type['remedy'])
-    node = graph.start(
+    node = graph.start_program(
         'cluster_autocorrelator', 'trays:=[1, 4]', *advised, arguments=('-r', rename)
     )
     name = graph.node.resolve_topic_name('tray_1/speed')
@@ -127,7 +127,7 @@ def test_a_middleware_that_is_not_there_is_named_and_the_advice_removes_it(graph
 def test_a_graph_that_works_has_no_finding_but_its_state(graph):
     """Neither a camera without camera_info nor a pipeline without a truth is a fault."""
     start_camera(graph)
-    graph.start('pipeline', 'source:=topic')
+    graph.start_program('pipeline', 'source:=topic')
     name = graph.node.resolve_topic_name(topics.SPEED.of(1))
     graph.until(lambda: graph.node.count_publishers(name) == 1)
     checks = until_told(graph, lambda checks: '/nanorocks/pipeline' in checks)
@@ -137,7 +137,7 @@ def test_a_graph_that_works_has_no_finding_but_its_state(graph):
 
 
 def start_camera(graph):
-    graph.start('simulator', 'width_px:=240', 'height_px:=240', 'frame_rate:=10.0')
+    graph.start_program('simulator', 'width_px:=240', 'height_px:=240', 'frame_rate:=10.0')
 
 
 def until_told(graph, holds):
@@ -151,14 +151,14 @@ def until_told(graph, holds):
 
 def test_a_camera_of_another_name_is_found_and_heard_as_advised(graph):
     graph.node.create_publisher(Image, '/cam0/image', qos_of(topics.RAW))
-    node = graph.start('preprocessor')
+    node = graph.start_program('preprocessor')
     raw = graph.node.resolve_topic_name(topics.RAW.name)
     graph.until(lambda: graph.node.count_subscribers(raw) == 1)
     checks = until_told(graph, lambda checks: raw in checks and '/cam0/image' in checks)
     assert_told('a camera of another name', checks[raw])
     graph.interrupt(node)
     _, *advice = re.findall(r'with --ros-args (-r) (\S+)', checks[raw]['remedy'])[0]
-    graph.start('preprocessor', arguments=('-r', *advice))
+    graph.start_program('preprocessor', arguments=('-r', *advice))
     graph.until(lambda: graph.node.count_subscribers('/cam0/image') == 1)
     checks = until_told(graph, lambda checks: '/cam0/image' in checks)
     assert raw not in checks
@@ -167,7 +167,7 @@ def test_a_camera_of_another_name_is_found_and_heard_as_advised(graph):
 
 def test_a_node_in_another_domain_is_named_and_heard_as_advised(graph):
     other = str(graph.domain % 100 + 1)
-    node = graph.start('haff_fitter')
+    node = graph.start_program('haff_fitter')
     name = graph.node.resolve_topic_name(topics.COR.of(1))
     graph.until(lambda: graph.node.count_publishers(name) == 1)
     named = f'haff_fitter (process {node.pid})'
@@ -181,7 +181,7 @@ def test_a_node_in_another_domain_is_named_and_heard_as_advised(graph):
 
 def test_what_a_node_says_of_its_camera_is_told_by_the_doctor_too(graph):
     camera = graph.node.create_publisher(Image, topics.RAW.name, qos_of(topics.RAW))
-    node = graph.start('preprocessor')
+    node = graph.start_program('preprocessor')
     graph.until(lambda: camera.get_subscription_count() == 1)
     told = {}
 

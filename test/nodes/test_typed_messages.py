@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from nanorocks_ros.nodes.base.typed_messages import typed_problem
+from nanorocks_ros.nodes.base.communication.typed_messages import typed_problem
 from nanorocks_ros.wire.products import ARRAY_TOPICS, TYPED_TOPICS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,8 +9,8 @@ import numpy as np
 import rclpy
 from nanorocks_msgs import msg as typed
 
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of, stamp_of
 from nanorocks_ros.nodes.base.node import NanorocksNode
-from nanorocks_ros.nodes.base.ros_messages import qos_of, stamp_of
 from nanorocks_ros.records import (
     CorEstimate,
     CorRelation,

@@ -21,7 +21,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_film import film
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 FLOWN = load_trays()[1]
 # There is no library of simulated decays of such a tray.

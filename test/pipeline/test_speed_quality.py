@@ -14,7 +14,7 @@ from nanorocks_ros.records import Frame, Quality, SpeedEstimate, SpeedMethod, Tr
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shaking.difference_noise import NoiseMeter
 
 NS = 1e9

@@ -28,7 +28,7 @@ from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_va
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.speed.structure_speed import StructureSpeed
 
 NS = 1e9

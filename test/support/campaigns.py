@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 
 PERIOD, SIZE, PEAK = 60.0, 6e-4, 0.008
 TIMES = np.concatenate((np.linspace(0.1, 3.0, 10), np.linspace(5.0, 59.0, 20)))

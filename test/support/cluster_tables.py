@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 
 
 def write_results(folder, areas, starts=(2.0, 62.0), period=60.0):

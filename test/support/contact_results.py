@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from contact_draws import drawn_impact, drawn_rebound
 
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.records import (
     NS,
     CorEstimate,

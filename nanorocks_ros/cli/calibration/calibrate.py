@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.cli.film_inputs import accept_films
+from nanorocks_ros.cli.imported_films import accept_films
 from nanorocks_ros.cli.parsing.tray_options import add_trays, add_trays_file
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.outputs.json_values import finite_or_none

@@ -52,7 +52,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Fit, print and write, and return the exit code."""
     from nanorocks_ros.cli.flags import bag_settings, settings_from
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.calibration.area_calibration import calibrate_area
@@ -116,9 +116,11 @@ def _write(
             write_parameters(files[number], fit, settings, f'tray {number}, {source}')
             print(f'nanorocks: parameters of tray {number} in {files[number]}', file=sys.stderr)
     if options.picture:
-        from nanorocks_ros.studies.calibration.area_figure import area_figure
+        from nanorocks_ros.studies.calibration.area_calibration_figure import (
+            area_calibration_figure,
+        )
 
-        area_figure(Path(options.picture), calibration.fits)
+        area_calibration_figure(Path(options.picture), calibration.fits)
         print(f'nanorocks: picture in {options.picture}', file=sys.stderr)
 
 

@@ -59,7 +59,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate, write and print, and return the exit code."""
     from nanorocks_ros.cli.calibration.finished_output import is_finished
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.experiment.trays import load_trays, tray_by_number
     from nanorocks_ros.inference.decay.decay_library_file import load_library
     from nanorocks_ros.jobs.tasks import Workers

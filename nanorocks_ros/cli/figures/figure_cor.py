@@ -82,7 +82,7 @@ def add_parser(kinds: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read or analyse, search, draw and print, and return the exit code."""
-    from nanorocks_ros.cli.progress import RunProgress
+    from nanorocks_ros.cli.progress_bar import RunProgress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.studies.figures.cor_figures import Reports, cor_figures, prepare_folder
 
@@ -159,9 +159,12 @@ def _settings(options: argparse.Namespace, bag: Path) -> PipelineSettings:
 
 def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
     """Analyse a bag into a folder beside the figures."""
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.analysis.offline_analysis import analyse
-    from nanorocks_ros.studies.analysis.results_folder import check_results_folder, write_results
+    from nanorocks_ros.studies.analysis.results.results_folder import (
+        check_results_folder,
+        write_results,
+    )
 
     scratch = check_results_folder(folder)
     with Progress('analysing') as progress:
@@ -174,7 +177,7 @@ def _analyse_bag(settings: PipelineSettings, bag: Path, folder: Path) -> Path:
 
 def _data(options: argparse.Namespace, source: Path) -> CorData:
     from nanorocks_ros.experiment.trays import tray_by_number
-    from nanorocks_ros.studies.analysis.published_cycles import (
+    from nanorocks_ros.studies.analysis.results.published_cycles import (
         published_cycles,
         published_lines,
         truth_of,

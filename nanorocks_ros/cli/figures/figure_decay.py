@@ -81,7 +81,7 @@ def _draw_figure(
     options: argparse.Namespace, table: Path, tray: Tray, cycles: tuple[CycleSpeeds, ...]
 ) -> dict[str, Any]:
     """Draw the picture, and return its numbers."""
-    from nanorocks_ros.studies.analysis.published_cycles import (
+    from nanorocks_ros.studies.analysis.results.published_cycles import (
         published_cycles,
         published_lines,
         truth_of,

@@ -48,7 +48,7 @@ def add_parser(kinds: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, draw and print, and return the exit code."""
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.studies.analysis.contact_tables import contacts_of_results
+    from nanorocks_ros.studies.analysis.results.contact_tables import contacts_of_results
     from nanorocks_ros.studies.figures.impact_figure import ImpactData, impact_figure
 
     path = Path(options.output)
@@ -77,7 +77,7 @@ def _prior(options: argparse.Namespace) -> PriorSettings:
 
 def _folders(path: Path) -> list[Path]:
     """The folder itself, or those of the recordings of a batch."""
-    from nanorocks_ros.studies.batch.batch_store import BAGS
+    from nanorocks_ros.studies.batch.manifest_entries import BAGS
 
     inner = path / BAGS
     if not inner.is_dir():
@@ -86,7 +86,7 @@ def _folders(path: Path) -> list[Path]:
 
 
 def _tray(folders: list[Path], tray: int | None) -> int:
-    from nanorocks_ros.studies.analysis.result_tables import trays_of
+    from nanorocks_ros.studies.analysis.results.result_tables import trays_of
 
     numbers = sorted({number for folder in folders for number in trays_of(folder, 'cor')})
     if tray is None and len(numbers) == 1:

@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     if options.simulate:
         numbers = numbers or (1, 3, 5)
     else:
-        from nanorocks_ros.studies.analysis.result_tables import trays_of
+        from nanorocks_ros.studies.analysis.results.result_tables import trays_of
 
         numbers = numbers or trays_of(Path(options.results), 'cluster')
     all_trays = load_trays(_trays_file(options.results))
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _trays_file(results: str | None) -> str:
     """The trays file that the results were made with."""
-    from nanorocks_ros.studies.analysis.results_folder import trays_file_of
+    from nanorocks_ros.studies.analysis.results.results_folder import trays_file_of
 
     return trays_file_of(Path(results)) if results else ''
 
@@ -109,9 +109,9 @@ def _read_curves(
 def _simulate_curves(
     options: argparse.Namespace, trays: dict[int, Tray]
 ) -> dict[int, Sequence[PackingCurve]]:
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.settings import SimulationSettings
-    from nanorocks_ros.studies.analysis.cluster_packing import simulated_packing
+    from nanorocks_ros.studies.analysis.simulated_packing import simulated_packing
 
     settings = SimulationSettings(
         sticking_speed=options.sticking_speed,

@@ -68,7 +68,7 @@ class _Terminal:
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Progress]:
-        from nanorocks_ros.cli.progress import Progress as Bar
+        from nanorocks_ros.cli.progress_bar import Progress as Bar
 
         with Bar(label) as bar:
             yield bar.count

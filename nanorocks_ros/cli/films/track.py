@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
 def tracked_bag(options: argparse.Namespace) -> TrackedBag:
     """Track the beads of the bag of the options, with progress; print what is to be known."""
     from nanorocks_ros.cli.flags import bag_settings
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.cli.remedies import print_notices
     from nanorocks_ros.studies.analysis.bag_tracks import track_bag
 
@@ -90,9 +90,9 @@ def tracked_bag(options: argparse.Namespace) -> TrackedBag:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     from nanorocks_ros.outputs.atomic_files import check_outputs
-    from nanorocks_ros.outputs.parquet import check_parquet
     from nanorocks_ros.outputs.photographs import PHOTOGRAPHS
-    from nanorocks_ros.studies.analysis.tracks_files import TABLES
+    from nanorocks_ros.outputs.tables.parquet import check_parquet
+    from nanorocks_ros.studies.analysis.results.tracks_files import TABLES
 
     names = {'--output': options.output, '--picture': options.picture}
     files = {flag: Path(name) for flag, name in names.items() if name}
@@ -102,7 +102,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _write(options: argparse.Namespace, bag: TrackedBag) -> None:
-    from nanorocks_ros.studies.analysis.tracks_files import write_tracks
+    from nanorocks_ros.studies.analysis.results.tracks_files import write_tracks
     from nanorocks_ros.studies.inspection.track_overlay import (
         MAGNIFICATION,
         overlay,

@@ -29,8 +29,8 @@ What is not told is guessed, and a line says so. Corners and beads are given in 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.film_inputs import accept_films
     from nanorocks_ros.cli.films.film_options import add_film_options
+    from nanorocks_ros.cli.imported_films import accept_films
 
     parser = commands.add_parser(
         'tray',

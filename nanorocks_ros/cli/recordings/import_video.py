@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.cli.flags import add_flag, flag_of, settings_from
 from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, rows
 
 if TYPE_CHECKING:
@@ -148,7 +147,7 @@ def _experiment(options: argparse.Namespace) -> dict[str, str]:
 def _run_single(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.studies.film_import.import_film import import_films
 
@@ -163,7 +162,7 @@ def _run_single(
 def _run_each(
     options: argparse.Namespace, settings: ImportSettings, paths: list[Path], output: Path
 ) -> int:
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.outputs.atomic_files import check_new_folder
     from nanorocks_ros.studies.film_import.find_films import find_films
     from nanorocks_ros.studies.film_import.import_each import import_each
@@ -239,6 +238,8 @@ def _text(imported: ImportResult) -> str:
 
 
 def _as_json(imported: ImportResult) -> dict[str, Any]:
+    from nanorocks_ros.records import NS
+
     return {
         'frames': imported.frames,
         'duplicates_dropped': imported.duplicates_dropped,

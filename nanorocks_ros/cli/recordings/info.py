@@ -10,8 +10,6 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.records import NS
-
 if TYPE_CHECKING:
     from nanorocks_ros.studies.inspection.bag_info import BagInfo, TopicReport
 
@@ -20,7 +18,7 @@ _MB = 1e6
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    from nanorocks_ros.cli.film_inputs import accept_films
+    from nanorocks_ros.cli.imported_films import accept_films
 
     parser = commands.add_parser('info', help='show the contents of a bag and its problems')
     parser.add_argument(
@@ -33,7 +31,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read the bag and print its contents; returns the exit code."""
-    from nanorocks_ros.cli.progress import Progress
+    from nanorocks_ros.cli.progress_bar import Progress
     from nanorocks_ros.studies.inspection.bag_info import bag_info
 
     with Progress('reading') as progress:
@@ -46,6 +44,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _as_json(info: BagInfo) -> dict[str, Any]:
+    from nanorocks_ros.records import NS
+
     lens = info.calibration
     return {
         'topics': [_topic_as_json(report) for report in info.topics.values()],
@@ -73,6 +73,8 @@ def _as_json(info: BagInfo) -> dict[str, Any]:
 
 
 def _topic_as_json(report: TopicReport) -> dict[str, Any]:
+    from nanorocks_ros.records import NS
+
     stamps = report.stamps_ns
     return {
         'name': report.info.name,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.parsing.tray_options import add_trays_file
-from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings
 
@@ -71,7 +71,7 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
         '--scene',
         action='store_true',
         help='film the plate with all its trays through the lens of the flight camera, '
-        'into --bag, --video or --picture (one .png or .jpg, at the end); see docs/use/scene.md',
+        'into --bag, --video or --picture (one .png or .jpg, at the end)',
     )
     parser.add_argument('--workers', type=int, help='processes; default: one for each core')
     parser.add_argument('--json', action='store_true', help='print one JSON object, SI units')

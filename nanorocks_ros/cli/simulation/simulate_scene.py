@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.flags import flag_of, settings_from
-from nanorocks_ros.cli.progress import Progress
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings, rows
 

@@ -89,7 +89,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Sweep, write and print, and return the exit code."""
-    from nanorocks_ros.cli.progress import RunProgress
+    from nanorocks_ros.cli.progress_bar import RunProgress
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.outputs.atomic_files import check_outputs
     from nanorocks_ros.studies.sweeps.sweep_runs import sweep

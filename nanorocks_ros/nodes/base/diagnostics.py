@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
+_FASTER = (
+    "take JPEGs (transport:='compressed'), follow fewer trays, or give the graph more workers"
+)
 _REPEAT_ERROR_S = 5.0
 _REPEAT_MISSING_S = 30.0
 # Numbers in a message: stamps and sizes differ from frame to frame.
@@ -95,8 +98,7 @@ class Diagnostics:
         if self._is_due('frames missing', _REPEAT_MISSING_S):
             self._node.get_logger().warning(
                 f'{topic}: {count} frames missing so far (gaps between the time stamps): lost in '
-                'transport, or this machine is too slow; follow fewer trays, '
-                'see docs/start/doctor.md'
+                f'transport, or this machine is too slow; {_FASTER}'
             )
 
     def _missing_frames(self) -> Problem | None:
@@ -106,7 +108,7 @@ class Diagnostics:
         return Problem(
             Level.WARN,
             f'{rate:.1f} frames/s are missing: lost in transport, or this machine is too slow; '
-            'follow fewer trays, see docs/start/doctor.md',
+            f'{_FASTER}',
             FRAMES_LOST,
         )
 

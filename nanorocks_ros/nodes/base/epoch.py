@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.nodes.base.ros_messages import stamp_of, time_message
+from nanorocks_ros.nodes.base.communication.ros_messages import stamp_of, time_message
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:

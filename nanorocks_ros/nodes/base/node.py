@@ -12,14 +12,14 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 
+from nanorocks_ros.nodes.base.communication.ros_messages import message_class, qos_of
+from nanorocks_ros.nodes.base.communication.topic_monitor import TopicMonitor
 from nanorocks_ros.nodes.base.compile_progress import CompileProgress
 from nanorocks_ros.nodes.base.diagnostics import Diagnostics
 from nanorocks_ros.nodes.base.parameters import NodeParameters
 from nanorocks_ros.nodes.base.problems import Level, Problem
 from nanorocks_ros.nodes.base.publishing import QOS_OVERRIDES, Outputs
-from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
 from nanorocks_ros.nodes.base.throttled_callbacks import ThrottledCallbacks
-from nanorocks_ros.nodes.base.topic_monitor import TopicMonitor
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:

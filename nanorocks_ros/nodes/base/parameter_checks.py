@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros import settings
 from nanorocks_ros.errors import ConfigurationError, did_you_mean
-from nanorocks_ros.nodes.base.qos_overrides import PREFIX as OVERRIDES
+from nanorocks_ros.nodes.base.communication.qos_overrides import PREFIX as OVERRIDES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

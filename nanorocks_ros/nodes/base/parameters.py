@@ -14,16 +14,24 @@ from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.parameter import Parameter
 
 from nanorocks_ros.errors import ConfigurationError, NanorocksError
+from nanorocks_ros.nodes.base.communication.qos_overrides import (
+    refuse_invalid_overrides,
+    refuse_overrides_of_unknown_topics,
+)
 from nanorocks_ros.nodes.base.parameter_checks import (
     command_line_parameters,
     require_string,
     unknown_parameters,
 )
-from nanorocks_ros.nodes.base.qos_overrides import (
-    refuse_invalid_overrides,
-    refuse_overrides_of_unknown_topics,
+from nanorocks_ros.settings import (
+    IN_RANGE,
+    SETTINGS_LISTED,
+    coerced,
+    problem,
+    rows,
+    with_current_names,
+    with_values,
 )
-from nanorocks_ros.settings import coerced, problem, rows, with_current_names, with_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -123,9 +131,7 @@ class NodeParameters:
                 self._node.set_parameters([Parameter(name, kind, [])])
         except ParameterException as error:
             reason = str(error).split('Reason: ')[-1]
-            raise ConfigurationError(
-                f'parameter {name}', reason, 'see docs/reference/parameters.md'
-            ) from error
+            raise ConfigurationError(f'parameter {name}', reason, IN_RANGE) from error
         return value
 
     def _with_own_types(self, parameters: list[Parameter]) -> list[Parameter]:
@@ -163,7 +169,7 @@ class NodeParameters:
             raise ConfigurationError(
                 f'node {self._node.get_name()}',
                 '; '.join(problems),
-                'see docs/reference/parameters.md',
+                SETTINGS_LISTED,
             )
 
     def refuse_overrides_of_unknown_topics(self, later_topics: Collection[str]) -> None:

@@ -9,14 +9,14 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from nanorocks_ros.nodes.base.result_topics import IMAGE_TOPICS
-from nanorocks_ros.nodes.base.ros_messages import (
+from nanorocks_ros.nodes.base.communication.result_topics import IMAGE_TOPICS
+from nanorocks_ros.nodes.base.communication.ros_messages import (
     array_message,
     image_message,
     message_class,
     qos_of,
 )
-from nanorocks_ros.nodes.base.typed_messages import typed_message, typed_problem
+from nanorocks_ros.nodes.base.communication.typed_messages import typed_message, typed_problem
 from nanorocks_ros.records import Notice, TrayImage
 from nanorocks_ros.wire.products import ARRAY_TOPICS, TYPED_TOPICS
 

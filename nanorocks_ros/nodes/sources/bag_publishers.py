@@ -12,8 +12,8 @@ from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.nodes.base.result_topics import RESULT_TOPICS
-from nanorocks_ros.nodes.base.ros_messages import message_class, qos_of
+from nanorocks_ros.nodes.base.communication.result_topics import RESULT_TOPICS
+from nanorocks_ros.nodes.base.communication.ros_messages import message_class, qos_of
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 

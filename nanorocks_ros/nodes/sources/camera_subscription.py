@@ -10,9 +10,9 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from sensor_msgs.msg import CameraInfo
 
 from nanorocks_ros.errors import FrameError
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
 from nanorocks_ros.nodes.base.problems import Level, Problem, Silence
-from nanorocks_ros.nodes.base.ros_messages import qos_of
 from nanorocks_ros.nodes.sources.dropped_frames import DroppedFrames
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
 from nanorocks_ros.recordings.messages.image_messages import (

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from std_msgs.msg import Header
 
-from nanorocks_ros.nodes.base.ros_messages import node_name_of, qos_of, stamp_of
+from nanorocks_ros.nodes.base.communication.ros_messages import node_name_of, qos_of, stamp_of
 from nanorocks_ros.wire import topics
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from nanorocks_ros.nodes.base.ros_messages import stamp_of
+from nanorocks_ros.nodes.base.communication.ros_messages import stamp_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.nodes.base.ros_messages import beads_message, camera_info_message
+from nanorocks_ros.nodes.base.communication.ros_messages import beads_message, camera_info_message
 from nanorocks_ros.nodes.sources.simulated_tray import publish_frame
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm, without_effects
 from nanorocks_ros.wire import topics

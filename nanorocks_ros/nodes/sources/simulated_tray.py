@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.experiment.trays import load_trays, tray_by_number
-from nanorocks_ros.nodes.base.ros_messages import image_message
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message
 from nanorocks_ros.simulation.tray_camera.tray_film import film
 from nanorocks_ros.wire import topics
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.nodes.base.ros_messages import image_message
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message
 from nanorocks_ros.studies.inspection.track_overlay import overlay
 from nanorocks_ros.wire import topics
 

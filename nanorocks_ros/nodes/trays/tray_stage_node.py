@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.calibration_file import calibrated
+from nanorocks_ros.nodes.base.communication.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.frame_acknowledgement import FrameAcknowledgement
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.parameters import ALL_RESET, CYCLE_GOES_ON
 from nanorocks_ros.nodes.base.told_settings import default_settings
-from nanorocks_ros.nodes.base.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.trays.image_size_check import ImageSizeCheck
 from nanorocks_ros.nodes.trays.track_images import TrackImages
 from nanorocks_ros.nodes.trays.tray_image_messages import color_frame, gray_frame

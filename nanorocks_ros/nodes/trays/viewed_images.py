@@ -10,7 +10,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from nanorocks_ros.dashboard.tray_pictures import encoded
-from nanorocks_ros.nodes.base.ros_messages import message_class
+from nanorocks_ros.nodes.base.communication.ros_messages import message_class
 from nanorocks_ros.nodes.trays.tray_image_messages import gray_frame, gray_or_bgr_frame
 from nanorocks_ros.wire import topics
 

@@ -1,6 +1,6 @@
 """Conversion of camera_info messages, of rosbags and of rclpy, to calibrations and views.
 
-Tested by ``test/nodes/base/test_ros_messages.py``.
+Tested by ``test/nodes/base/communication/test_ros_messages.py``.
 """
 
 from __future__ import annotations

@@ -16,12 +16,12 @@ from nanorocks_ros.simulation.engine.collision.rigid_collisions import renew_str
 from nanorocks_ros.simulation.engine.collision.wall_collisions import bounce_off_wall
 from nanorocks_ros.simulation.engine.event_prediction import predict
 from nanorocks_ros.simulation.engine.event_queue import earliest
-from nanorocks_ros.simulation.engine.flight.rigid_motion import (
+from nanorocks_ros.simulation.engine.flight.rotation_series import is_at_end
+from nanorocks_ros.simulation.engine.flight.turning_motion import (
     is_turning,
     shift_motions,
     turns,
 )
-from nanorocks_ros.simulation.engine.flight.rotation_series import is_at_end
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,
     DONE,

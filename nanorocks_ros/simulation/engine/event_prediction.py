@@ -21,12 +21,12 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     velocity_at,
 )
 from nanorocks_ros.simulation.engine.flight.pair_times import square_of, wait_for_contact
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turns
 from nanorocks_ros.simulation.engine.flight.turning_contacts import (
     end_of_stretch,
     shell_exit_of_turning,
     wait_with_turning,
 )
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turns
 from nanorocks_ros.simulation.engine.flight.unequal_drag import wait_with_unequal_drag
 from nanorocks_ros.simulation.engine.gas_state import (
     COUNTER,

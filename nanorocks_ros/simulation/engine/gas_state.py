@@ -95,7 +95,7 @@ class State(NamedTuple):
         Without drag, or with it: decay rate of the velocity of each bead, and of its body. The
         number of axes tells the compiler which.
     motions : ndarray (0,) or (n + 2, columns)
-        Without bodies that turn, or with them: see `flight.rigid_motion`. The number of axes
+        Without bodies that turn, or with them: see `flight.turning_motion`. The number of axes
         tells the compiler which.
     masses : ndarray (n, 1) or (n, 2), [kg]
         Of each bead; with sticking also of the body of that number, infinite when it is stuck

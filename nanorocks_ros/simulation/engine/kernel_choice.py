@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
-from nanorocks_ros.simulation.engine.flight.rigid_motion import new_motions
+from nanorocks_ros.simulation.engine.flight.turning_motion import new_motions
 from nanorocks_ros.simulation.engine.gas_state import BODY, ORIGINAL, new_state
 from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
     list_skin,

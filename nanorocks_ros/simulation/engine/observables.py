@@ -14,7 +14,7 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     spin_left,
     velocity_at,
 )
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turned_bead, turns
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTS,

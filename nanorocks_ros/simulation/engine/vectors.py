@@ -1,6 +1,6 @@
 """Vectors of three numbers, as tuples, for compiled code.
 
-Tested by ``test/simulation/engine/flight/test_rigid_motion.py``.
+Tested by ``test/simulation/engine/flight/test_turning_motion.py``.
 """
 
 from __future__ import annotations

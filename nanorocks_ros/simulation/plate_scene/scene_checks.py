@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.settings import problem, rows
+from nanorocks_ros.settings import IN_RANGE, problem, rows
 from nanorocks_ros.simulation.plate_scene.close_up_plate import FURTHEST_SHIFT
 from nanorocks_ros.simulation.plate_scene.moving_plate import FURTHEST_PX
 from nanorocks_ros.simulation.plate_scene.optics.camera_shake import FURTHEST_JITTER
@@ -65,6 +65,4 @@ def check_scene(scene: SceneSettings) -> None:
     if not scene.trays or len(set(scene.trays)) != len(scene.trays):
         wrong.append(f'trays: {scene.trays} is empty or has duplicates')
     if wrong:
-        raise ConfigurationError(
-            'scene', '; '.join(wrong), 'see docs/reference/parameters.md for names and ranges'
-        )
+        raise ConfigurationError('scene', '; '.join(wrong), IN_RANGE)

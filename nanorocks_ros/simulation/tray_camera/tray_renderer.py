@@ -11,8 +11,8 @@ from nanorocks_ros.errors import SimulationError
 from nanorocks_ros.experiment.materials import known_materials
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.numerics.counter_rng import Purpose, hashed, key_for
+from nanorocks_ros.simulation.tray_camera.appearance_rows import look_rows
 from nanorocks_ros.simulation.tray_camera.bead_drawing import copy_surface, draw_beads, expose
-from nanorocks_ros.simulation.tray_camera.bead_looks import look_rows
 from nanorocks_ros.simulation.tray_camera.tray_background import empty_tray, noisy_strip
 
 if TYPE_CHECKING:

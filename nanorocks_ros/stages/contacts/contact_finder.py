@@ -277,7 +277,7 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
             tray=self._tray.number,
             tracks=np.array([jump.track for jump in jumps], dtype=np.int32),
             species=np.array([jump.species for jump in jumps], dtype=np.int32),
-            radii=np.array([jump.radius for jump in jumps]),
+            radii=np.array([self._segments.seen_radius(jump) for jump in jumps]),
             radius_errors=np.array([jump.radius_error for jump in jumps]),
             masses=np.array([self._mass(jump) for jump in jumps]),
             before=before,

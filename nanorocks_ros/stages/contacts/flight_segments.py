@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import Tracks
 
+# Largest difference of the radii that show from those told; beyond it the scale is told wrong, and
+# flagged.
+_MOST_ENLARGED = 0.02
 # Relative error of a measured radius from the shape of the outline, beside the stated error.
 _OUTLINE_ERROR = 0.02
 _INITIAL_SLOTS = 64
@@ -136,6 +139,8 @@ class FlightSegments:
         # Species, radius and measurement error of the radius of each slot.
         self._species = np.zeros(_INITIAL_SLOTS, dtype=np.int32)
         self._sizes = np.zeros((_INITIAL_SLOTS, 2))
+        # Of each species, sums of weights and of weighted measured radii.
+        self._seen_radii = np.zeros((len(species), 2))
         # Tracks and species in the last frame, and the slot of each; -1 without a slot.
         self._last_tracks = b'', b''
         self._track_slots = np.empty(0, dtype=np.int64)
@@ -153,6 +158,20 @@ class FlightSegments:
     def noise(self) -> NDArray[np.float64]:
         """Variance of positions about flights over that by their errors, (species,)."""
         return self._residuals.variances
+
+    def seen_radius(self, jump: VelocityJump) -> float:
+        """Radius of a bead in the scale in which distances of beads show, [m].
+
+        Beads above the floor are nearer to the camera: it shows them larger, and farther apart. So
+        distances at contacts are compared with the radii that show, also where all beads of a
+        species are alike: their mean.
+        """
+        told = self._known_radii[jump.species]
+        weights, weighted = self._seen_radii[jump.species].tolist()
+        if math.isnan(told) or weights == 0.0:
+            return jump.radius
+        low, high = (1.0 - _MOST_ENLARGED) * told, (1.0 + _MOST_ENLARGED) * told
+        return float(np.clip(weighted / weights, low, high))
 
     def use_drag(self, drag: float) -> None:
         """Fit lines in the clock of a gas from now on.
@@ -204,6 +223,7 @@ class FlightSegments:
             ),
             self._known_radii,
             self._sizes,
+            self._seen_radii,
             lines,
             bends,
         )

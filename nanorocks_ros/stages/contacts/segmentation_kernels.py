@@ -74,6 +74,7 @@ def append_positions(
     beads: FrameBeads,
     known_radii: NDArray[np.float64],
     sizes: NDArray[np.float64],
+    seen_radii: NDArray[np.float64],
     jumps: NDArray[np.float64],
     bends: NDArray[np.float64],
 ) -> NDArray[np.int64]:
@@ -93,6 +94,8 @@ def append_positions(
         NaN for a species whose beads differ in size.
     sizes : ndarray (slots, 2), [m]
         Written: radii and their measurement errors.
+    seen_radii : ndarray (species, 2), [1/m^2], [1/m]
+        Sums over all visible beads, written: weights, and measured radii times weights.
     jumps : ndarray (n, JUMP_SIZE)
         Written for each velocity jump whose flights before and after are complete now.
     bends : ndarray (n, BEND_SIZE)
@@ -110,10 +113,14 @@ def append_positions(
         bends[k, 2] = 0.0
         if slot < 0 or not beads.seen[k]:
             continue
-        radius = known_radii[beads.species[k]]
+        kind, error = beads.species[k], beads.radius_errors[k]
+        if error > 0.0:
+            seen_radii[kind, 0] += 1.0 / (error * error)
+            seen_radii[kind, 1] += beads.radii[k] / (error * error)
+        radius = known_radii[kind]
         if radius != radius:
             radius = beads.radii[k]
-        sizes[slot, 0], sizes[slot, 1] = radius, beads.radius_errors[k]
+        sizes[slot, 0], sizes[slot, 1] = radius, error
         for c in range(2):
             position[c] = beads.positions[k, c] + beads.displacement[c]
         variance = residuals.variances[beads.species[k]]

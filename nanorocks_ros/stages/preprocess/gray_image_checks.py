@@ -1,6 +1,6 @@
 """Checks of the gray image of a tray: saturation, low contrast and glare.
 
-Tested by ``test/stages/preprocess/test_preprocessor.py``.
+Tested by ``test/stages/preprocess/test_frame_preprocessor.py``.
 """
 
 from __future__ import annotations

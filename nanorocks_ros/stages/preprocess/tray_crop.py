@@ -1,6 +1,6 @@
 """The crop of one tray: its region, its motion and its pixels at rest.
 
-Tested by ``test/stages/preprocess/test_preprocessor.py``.
+Tested by ``test/stages/preprocess/test_frame_preprocessor.py``.
 """
 
 from __future__ import annotations

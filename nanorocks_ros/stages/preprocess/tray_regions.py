@@ -1,6 +1,6 @@
 """Which part of the frame each tray covers, by the settings, and whether it can.
 
-Tested by ``test/stages/preprocess/test_preprocessor.py``.
+Tested by ``test/stages/preprocess/test_frame_preprocessor.py``.
 """
 
 from __future__ import annotations

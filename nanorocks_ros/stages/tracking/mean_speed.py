@@ -6,9 +6,9 @@ variance of the noise is subtracted. Displacements over twice the lag give the s
 collisions.
 
 Beads that are not seen are not a random sample. Fast ones are lost more often: a bead counts that
-is seen in two frames, not only one seen in all three. In a mixture one species hides the other:
-each species counts by its number of beads in the tray, and each bead for those that its
-surroundings hide (`hidden_beads`).
+is seen in the middle frame and at one of the ends, not only one seen in all three. In a mixture
+one species hides the other: each species counts by its number of beads in the tray, and each bead
+for those that its surroundings hide (`hidden_beads`).
 """
 
 from __future__ import annotations

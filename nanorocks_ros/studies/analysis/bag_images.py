@@ -13,7 +13,7 @@ from nanorocks_ros.errors import FrameError, RecordingError
 from nanorocks_ros.experiment.calibration_file import calibrated
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.records import Frame, Notice, TrayImage
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.studies.analysis.bag_frames import BagFrames
 
 if TYPE_CHECKING:

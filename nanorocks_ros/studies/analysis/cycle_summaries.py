@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.records import CorStatus, Quality
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

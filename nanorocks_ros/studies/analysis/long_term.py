@@ -15,8 +15,8 @@ from nanorocks_ros.inference.trend_tests import (
     quiet_periods,
     robust_trend,
 )
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import write_rows
 from nanorocks_ros.records import CorEstimate
 from nanorocks_ros.studies.analysis.cycle_summaries import (
     CycleSummary,
@@ -24,7 +24,7 @@ from nanorocks_ros.studies.analysis.cycle_summaries import (
     cycles_of,
     size_measure,
 )
-from nanorocks_ros.studies.analysis.result_tables import trays_of
+from nanorocks_ros.studies.analysis.results.result_tables import trays_of
 from nanorocks_ros.studies.results.record_columns import columns_of
 from nanorocks_ros.studies.results.run_provenance import run_provenance
 

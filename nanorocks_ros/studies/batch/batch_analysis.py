@@ -12,7 +12,7 @@ from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.recordings.film.natural_sort import natural_key
-from nanorocks_ros.studies.batch.batch_store import BatchStore, Entry
+from nanorocks_ros.studies.batch.batch_store import BatchStore
 from nanorocks_ros.studies.batch.batch_task import (
     DONE,
     FAILED,
@@ -22,6 +22,7 @@ from nanorocks_ros.studies.batch.batch_task import (
     analyse_bag,
     read_summary,
 )
+from nanorocks_ros.studies.batch.manifest_entries import Entry
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

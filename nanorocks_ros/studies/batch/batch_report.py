@@ -33,7 +33,7 @@ from nanorocks_ros.studies.batch.batch_words import (
     mean_cell,
     measured_cell,
 )
-from nanorocks_ros.studies.batch.campaign_means import means_as_json
+from nanorocks_ros.studies.batch.means_json import means_as_json
 from nanorocks_ros.studies.batch.mixed_recordings import mixed_recordings
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
 

@@ -14,7 +14,7 @@ from nanorocks_ros.outputs.html_report import NOT_KNOWN, Picture, Section, Table
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.records import Tracks
-from nanorocks_ros.studies.analysis.results_folder import STATISTICS
+from nanorocks_ros.studies.analysis.results.results_folder import STATISTICS
 from nanorocks_ros.studies.gas_statistics.statistics_figure import statistics_figure
 from nanorocks_ros.studies.gas_statistics.statistics_files import statistics_values
 from nanorocks_ros.studies.gas_statistics.tray_statistics import GasChoices, tray_statistics

@@ -11,9 +11,8 @@ import os
 import re
 import shutil
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import RecordingError
@@ -24,7 +23,7 @@ from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
-from nanorocks_ros.studies.analysis.results_folder import SUMMARY
+from nanorocks_ros.studies.analysis.results.results_folder import SUMMARY
 from nanorocks_ros.studies.batch.batch_task import (
     DONE,
     PARTIAL,
@@ -32,13 +31,19 @@ from nanorocks_ros.studies.batch.batch_task import (
     BagTask,
     read_summary,
 )
+from nanorocks_ros.studies.batch.manifest_entries import (
+    BAGS,
+    Entry,
+    entry_as_json,
+    entry_from_json,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from nanorocks_ros.settings import PipelineSettings
 
-MANIFEST, BAGS = 'manifest.json', 'bags'
+MANIFEST = 'manifest.json'
 _MARK, _NOTES = '.nanorocks_batch', '.under_way'
 _WAITING = 'waiting'
 # Of the name of a folder, of the 255 bytes that file systems take.
@@ -54,24 +59,6 @@ _WRONG_CONTENT = (
     AttributeError,
     RecordingError,
 )
-
-
-@dataclass(slots=True, kw_only=True)
-class Entry:
-    """A recording in the manifest.
-
-    Parameters
-    ----------
-    path : Path
-        Absolute.
-    folder : str
-        Name of the folder of its results.
-    outcome : BagOutcome
-    """
-
-    path: Path
-    folder: str
-    outcome: BagOutcome
 
 
 class BatchStore:
@@ -259,7 +246,7 @@ class BatchStore:
             'nanorocks_ros': __version__,
             'image_topic': self._image_topic,
             'settings': {row.name: row.default for row in rows(self._settings)},
-            'bags': [_as_json(entry) for entry in {**self._known, **self.entries}.values()],
+            'bags': [entry_as_json(entry) for entry in {**self._known, **self.entries}.values()],
         }
         write_bytes(self.folder / MANIFEST, json.dumps(content, indent=1).encode())
 
@@ -267,7 +254,7 @@ class BatchStore:
         path = self.folder / MANIFEST
         try:
             content = read_object(path)
-            return {entry.path: entry for entry in map(_from_json, content['bags'])}
+            return {entry.path: entry for entry in map(entry_from_json, content['bags'])}
         except FileNotFoundError:
             return {}
         except _WRONG_CONTENT:
@@ -309,34 +296,3 @@ def _free_name(path: Path, taken: Iterable[str]) -> str:
         number += 1
         free = f'{name}-{number}'
     return free
-
-
-def _as_json(entry: Entry) -> dict[str, Any]:
-    outcome = entry.outcome
-    return {
-        'bag': str(entry.path),
-        'folder': f'{BAGS}/{entry.folder}',
-        'state': outcome.state,
-        'reason': outcome.reason,
-        'content': outcome.content,
-        'files': [list(file) for file in outcome.files],
-    }
-
-
-def _from_json(content: dict[str, Any]) -> Entry:
-    name = Path(content['folder']).name
-    # Hidden ones are leftovers of killed workers.
-    if not name or name.startswith('.') or '\0' in name + content['bag']:
-        raise ValueError
-    return Entry(
-        path=Path(content['bag']),
-        folder=name,
-        outcome=BagOutcome(
-            state=str(content['state']),
-            reason=str(content['reason']),
-            content=str(content['content']),
-            files=tuple(
-                (str(a), int(b), int(c), int(d), int(e)) for a, b, c, d, e in content['files']
-            ),
-        ),
-    )

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.outputs.table_columns import JOINED, Column
-from nanorocks_ros.outputs.table_files import write_package, write_table
+from nanorocks_ros.outputs.tables.table_columns import JOINED, Column
+from nanorocks_ros.outputs.tables.table_files import write_package, write_table
 from nanorocks_ros.records import ClusterEstimate, CorEstimate
-from nanorocks_ros.studies.analysis.results_json import BY_SOURCE
-from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined, means_as_json
+from nanorocks_ros.studies.analysis.results.results_json import BY_SOURCE
+from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined
+from nanorocks_ros.studies.batch.means_json import means_as_json
 from nanorocks_ros.studies.results.record_columns import GOOD, columns_of
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Kind
+    from nanorocks_ros.outputs.tables.table_columns import Kind
 
 CYCLES, TRAYS = 'cycles', 'trays'
 _OF_COR = {column.name: column for column in columns_of(CorEstimate)}

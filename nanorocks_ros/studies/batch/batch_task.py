@@ -31,8 +31,8 @@ from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
-from nanorocks_ros.studies.analysis.results_folder import EVIDENCE, SUMMARY, write_results
-from nanorocks_ros.studies.analysis.results_json import as_json
+from nanorocks_ros.studies.analysis.results.results_folder import EVIDENCE, SUMMARY, write_results
+from nanorocks_ros.studies.analysis.results.results_json import as_json
 from nanorocks_ros.studies.batch.batch_statistics import TrackCollector, write_statistics
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.html_report import NOT_KNOWN, number, with_error, with_interval
 from nanorocks_ros.outputs.safe_text import counted
-from nanorocks_ros.studies.batch.campaign_means import means_as_json
+from nanorocks_ros.studies.batch.means_json import means_as_json
 
 if TYPE_CHECKING:
     from nanorocks_ros.studies.batch.campaign_means import Combined, TrayMeans

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.outputs.csv_tables import number, read_csv
+from nanorocks_ros.outputs.tables.csv_tables import number, read_csv
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, read_curve
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
-from nanorocks_ros.outputs.csv_tables import read_csv
+from nanorocks_ros.outputs.tables.csv_tables import read_csv
 from nanorocks_ros.records import CorStatus
 from nanorocks_ros.studies.results.record_columns import number_of
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.outputs.csv_tables import number, read_csv
 from nanorocks_ros.outputs.npz_archive import read_archive
+from nanorocks_ros.outputs.tables.csv_tables import number, read_csv
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,7 @@ from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, TRUTH, TWO_COLUMNS, plain_numbers
 from nanorocks_ros.physics.haff_law import granular_energy, haff_speed
 from nanorocks_ros.records import NS, CorRelation, CorStatus
-from nanorocks_ros.studies.analysis.published_cycles import Truth, published_lines
+from nanorocks_ros.studies.analysis.results.published_cycles import Truth, published_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
 
@@ -46,6 +47,9 @@ PAPER_SOURCE = 'the paper, twice the mean speed at its onset'
 _MASSES = 1e-10, 1e-3
 # Factor of mass, up and down, over which the slope is drawn.
 _SLOPE_SPAN = 12.0
+# Width of the name of a tray in decades of mass, and how far below the points it stands, a factor.
+_NAME_DECADES = 0.65
+_NAMES_BELOW = 2.5
 
 
 def threshold_of_tray(
@@ -231,14 +235,37 @@ def _draw_points(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
             else f'{point.source} (bar: masses in the tray)',
         )
         labelled.add(point.source)
-        above = point.speed == max(other.speed for other in points)
-        left = point.mass == min(other.mass for other in points) and not above
+    name_trays(axes, points)
+
+
+def name_trays(axes: Axes, points: Sequence[MeasuredThreshold]) -> None:
+    """Names of the trays in a row below all points, each with a line to its lowest point.
+
+    Trays differ by a factor of three in mass on an axis of seven decades: names beside the points
+    would cover each other.
+    """
+    trays: dict[float, list[MeasuredThreshold]] = {}
+    for point in sorted(points, key=lambda point: (point.mass, point.tray)):
+        trays.setdefault(point.mass, []).append(point)
+    masses = _apart(np.array(list(trays)))
+    height = min(point.lower for point in points) / _NAMES_BELOW
+    for mass, alike in zip(masses, trays.values(), strict=True):
+        numbers = sorted({point.tray for point in alike})
         axes.annotate(
-            f'tray {point.tray}',
-            (_MG * point.mass, _MM * point.speed),
-            xytext=(-6 if left else 6, 7 if above else -14),
-            textcoords='offset points',
-            ha='right' if left else 'left',
+            f'tray{"s" if numbers[1:] else ""} {", ".join(map(str, numbers))}',
+            (_MG * alike[0].mass, _MM * min(point.lower for point in alike)),
+            xytext=(_MG * float(mass), _MM * height),
+            ha='center',
+            va='top',
+            arrowprops={'arrowstyle': '-', 'lw': 0.6, 'shrinkA': 0.0, 'shrinkB': 2.0},
             bbox={'facecolor': 'white', 'alpha': 0.7, 'lw': 0, 'pad': 0.5},
-            zorder=6,
+            zorder=4,
         )
+
+
+def _apart(masses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ascending masses, moved apart by as little as their names need, about the same middle."""
+    logs = np.log10(masses)
+    steps = _NAME_DECADES * np.arange(logs.size)
+    spread = np.maximum.accumulate(logs - steps) + steps
+    return np.asarray(10.0 ** (spread - (spread - logs).mean()))

@@ -185,7 +185,7 @@ class _Import:
                 return info.start_ns
             notices.append(
                 f'{info.path}: the time of recording is unknown; the stamps start at '
-                f'{format_iso8601(_UNKNOWN_START_NS)}; pass --start to set it'
+                f'{format_iso8601(_UNKNOWN_START_NS)}; `nanorocks import --start` sets it'
             )
             return _UNKNOWN_START_NS
         next_ns = self._end_ns + self._step_ns

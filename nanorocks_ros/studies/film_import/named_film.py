@@ -1,6 +1,6 @@
 """Checks of what a user names as a film or a bag, with a remedy for whatever else it is.
 
-Tested by ``test/cli/test_film_inputs.py``.
+Tested by ``test/cli/test_imported_films.py``.
 """
 
 from __future__ import annotations

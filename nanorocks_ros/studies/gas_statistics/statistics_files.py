@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.json_values import json_values
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_package
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import write_package
 from nanorocks_ros.records import Measured
 from nanorocks_ros.studies.gas_statistics.velocity_distribution import EDGES, sonine_density
 from nanorocks_ros.studies.results.run_provenance import run_provenance

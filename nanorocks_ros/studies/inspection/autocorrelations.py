@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import write_rows
 from nanorocks_ros.physics.paper_clusters import (
     PAPER_TABLE_3,
     paper_calibration,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.outputs.table_columns import Column
-from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.outputs.tables.table_columns import Column
+from nanorocks_ros.outputs.tables.table_files import write_rows
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import NS, SpeedEstimate
 from nanorocks_ros.settings import with_values

@@ -27,7 +27,7 @@ from nanorocks_ros.settings import (
     with_values,
 )
 from nanorocks_ros.stages.clusters.correlation_width import correlated
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

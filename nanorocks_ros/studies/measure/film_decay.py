@@ -13,7 +13,7 @@ from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.jobs.resumed_tasks import delete_parts_of_finished
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
-from nanorocks_ros.studies.analysis.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
 from nanorocks_ros.studies.libraries.decay_simulations import build_library
 from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan
 

@@ -18,8 +18,8 @@ from nanorocks_ros.pipeline.contact_words import contact_lines, length_unit, mot
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
-from nanorocks_ros.studies.analysis.tracks_files import write_tracks
-from nanorocks_ros.studies.analysis.tray_words import tray_lines
+from nanorocks_ros.studies.analysis.results.tracks_files import write_tracks
+from nanorocks_ros.studies.analysis.results.tray_words import tray_lines
 from nanorocks_ros.studies.inspection.track_overlay import overlay, with_scale_bar, write_overlay
 from nanorocks_ros.studies.measure.film_decay import DecayStep, measured_decay
 from nanorocks_ros.studies.measure.measure_report import write_measure_report

@@ -17,7 +17,10 @@ from nanorocks_ros.outputs.html_report import (
 )
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.pipeline.contact_words import restitution_text, restitutions
-from nanorocks_ros.studies.analysis.published_cycles import published_cycles, published_text
+from nanorocks_ros.studies.analysis.results.published_cycles import (
+    published_cycles,
+    published_text,
+)
 from nanorocks_ros.studies.measure.measure_figure import measure_figure
 from nanorocks_ros.studies.measure.measure_tables import (
     CONTACTS,

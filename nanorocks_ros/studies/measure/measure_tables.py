@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.tables.table_columns import Column
 from nanorocks_ros.pipeline.contact_words import restitutions
 from nanorocks_ros.studies.measure.track_speeds import SPEED_COLUMNS
 from nanorocks_ros.studies.results.contact_columns import CONTACT_COLUMNS, contact_arrays

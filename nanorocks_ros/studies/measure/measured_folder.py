@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
-from nanorocks_ros.outputs.table_files import write_package, write_table
+from nanorocks_ros.outputs.tables.table_files import write_package, write_table
 from nanorocks_ros.outputs.unfinished_files import holds_files
-from nanorocks_ros.studies.analysis.tracks_files import columns_of
+from nanorocks_ros.studies.analysis.results.tracks_files import columns_of
 from nanorocks_ros.studies.measure.measure_tables import tray_tables
 from nanorocks_ros.studies.measure.measured_tray import DECAY_NOT_READ
 from nanorocks_ros.studies.results.results_provenance import provenance_of, read_provenance
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag
     from nanorocks_ros.studies.measure.measured_tray import MeasuredTray

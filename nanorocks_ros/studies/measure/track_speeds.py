@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.tables.table_columns import Column
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,8 +21,8 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.settings import CompressionSettings, SceneSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
-from nanorocks_ros.studies.analysis.results_folder import write_results
-from nanorocks_ros.studies.analysis.results_json import as_json
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_json import as_json
 from nanorocks_ros.studies.reproduction.campaign_plan import (
     BOUNCING,
     STICKING,

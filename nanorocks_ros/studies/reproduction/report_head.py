@@ -30,8 +30,8 @@ _LIMITS = (
     ('Automated tracks of the paper (Figures 2, 3 and 6, Table 2)', 'Made with TrackMate after '
      'processing whose steps are not given; the tracks here are ours.'),
     ('Despeckling, threshold of the binarisation, mixture of colours, level of the '
-     'autocorrelation', 'Not given ("arbitrary"): ours are settings, see docs/method/speed.md and '
-     'docs/method/autocorrelation.md.'),
+     'autocorrelation', 'Not given ("arbitrary"): ours are settings, which '
+     '`nanorocks analyse --help-all` lists under preprocess, speed and clusters.'),
     ('Values of Figures 6, 7 (inset), 9, 10 and 14 for single trays', 'Only drawn; the text has '
      'tray 1, ranges, the compactions and three sticking speeds.'),
     ('Table 3 by hand, and the grains of trays 6 to 8 in it', 'Counted here from the truth and '
@@ -39,8 +39,8 @@ _LIMITS = (
      'assumes is not printed and was computed from its table.'),
     ('Several clusters at the end of a cycle (Table 3, Figure 8e)', 'Clusters of the campaign '
      'neither break nor stick to walls, so that nearly all beads end in one or two. What kept '
-     'them apart in flight is not known: walls that hold slow beads would '
-     '(docs/method/clusters.md), but also gas, charge or the swinging tray.'),
+     'them apart in flight is not known: walls that hold slow beads would, '
+     'but also gas, charge or the swinging tray.'),
     ('Autocorrelation of trays 2 and 4', 'The paper got no result under chalk either; ours is in '
      'the tables with its status.'),
     ('Dates and periods of larger clusters (Figure 9)', 'The experiment kept no absolute time; '

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.tables.table_columns import Column
 from nanorocks_ros.records import NS, WALL_NAMES, PairCollision, Rebound
 
 if TYPE_CHECKING:

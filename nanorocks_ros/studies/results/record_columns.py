@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nanorocks_ros.outputs.csv_tables import number
-from nanorocks_ros.outputs.table_columns import JOINED, Column
+from nanorocks_ros.outputs.tables.csv_tables import number
+from nanorocks_ros.outputs.tables.table_columns import JOINED, Column
 from nanorocks_ros.records import NS, Quality
 from nanorocks_ros.wire.array_layouts import ENUMERATIONS, STAMPS, layout
 from nanorocks_ros.wire.flat_records import flat_value, place_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.outputs.table_columns import Kind
+    from nanorocks_ros.outputs.tables.table_columns import Kind
     from nanorocks_ros.records import ArrayRecord
     from nanorocks_ros.wire.layout_fields import LayoutField
 

@@ -1,6 +1,6 @@
 """Folders of results where a film or a recording is wanted: their pictures are no film.
 
-Tested by ``test/cli/test_film_inputs.py``.
+Tested by ``test/cli/test_imported_films.py``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.json_values import read_object
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
 
 if TYPE_CHECKING:

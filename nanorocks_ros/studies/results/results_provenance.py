@@ -21,7 +21,7 @@ from nanorocks_ros.experiment.recorded_experiment import (
 )
 from nanorocks_ros.experiment.trays import load_trays, trays_text
 from nanorocks_ros.outputs.json_values import json_values, read_object
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.settings import PipelineSettings, rows, with_values
 from nanorocks_ros.studies.results.run_provenance import run_provenance

@@ -10,8 +10,8 @@ import numpy as np
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.outputs.json_values import parse_object
 from nanorocks_ros.outputs.npz_archive import read_archive, write_archive
-from nanorocks_ros.outputs.table_columns import Column, float_columns
-from nanorocks_ros.outputs.table_files import write_rows
+from nanorocks_ros.outputs.tables.table_columns import Column, float_columns
+from nanorocks_ros.outputs.tables.table_files import write_rows
 from nanorocks_ros.studies.results.run_provenance import run_provenance
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
 from nanorocks_ros.studies.sweeps.sweep_plan import Axis
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.outputs.json_values import parse_object
-    from nanorocks_ros.outputs.table_columns import Kind
+    from nanorocks_ros.outputs.tables.table_columns import Kind
 from nanorocks_ros.outputs.npz_archive import Arrays
 
 CURVES = ('mean_speed', 'mean_speed_error', 'mean_projected_speed', 'mean_projected_speed_error')

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.outputs.atomic_files import check_outputs
-from nanorocks_ros.outputs.parquet import check_parquet
+from nanorocks_ros.outputs.tables.parquet import check_parquet
 from nanorocks_ros.studies.synthetic.film_bag import check_camera, check_quality, film_into_bag
 from nanorocks_ros.studies.synthetic.film_video import (
     VIDEOS,

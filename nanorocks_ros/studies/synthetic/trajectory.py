@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.outputs.atomic_files import atomic_file
-from nanorocks_ros.outputs.parquet import write_parquet
-from nanorocks_ros.outputs.table_columns import Column
+from nanorocks_ros.outputs.tables.parquet import write_parquet
+from nanorocks_ros.outputs.tables.table_columns import Column
 from nanorocks_ros.simulation.initial_state import inventory
 
 if TYPE_CHECKING:

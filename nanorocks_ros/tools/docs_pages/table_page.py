@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES
 from nanorocks_ros.studies.analysis.long_term import campaign_columns
-from nanorocks_ros.studies.analysis.tracks_files import COLUMNS as TRACKS
+from nanorocks_ros.studies.analysis.results.tracks_files import COLUMNS as TRACKS
 from nanorocks_ros.studies.batch.batch_tables import cycle_columns
 from nanorocks_ros.studies.gas_statistics.statistics_files import TABLES as STATISTICS
 from nanorocks_ros.studies.inspection.autocorrelations import COLUMNS as AUTOCORRELATIONS
@@ -30,7 +30,7 @@ from nanorocks_ros.wire.products import MEASURED
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from nanorocks_ros.outputs.table_columns import Column
+    from nanorocks_ros.outputs.tables.table_columns import Column
 
 _INTRODUCTION = """\
 <!-- Made by `make docs` from the code; change that instead. -->

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 import nanorocks_ros
-from nanorocks_ros.numerics.kernel_cache import cache_root
+from nanorocks_ros.numerics.compilation.kernel_cache import cache_root
 from nanorocks_ros.settings import DashboardSettings
 from nanorocks_ros.tools.doctor import node_processes
 from nanorocks_ros.tools.doctor.findings import Finding, Status

@@ -131,7 +131,7 @@ def pip_install(packages: str) -> str:
     marker = Path(sysconfig.get_path('stdlib')) / 'EXTERNALLY-MANAGED'
     if sys.prefix == sys.base_prefix and marker.exists():
         return (
-            f'pip install --break-system-packages {packages}, or in an environment of its own '
-            '(docs/use/commands.md)'
+            f'pip install --break-system-packages {packages}, or in an environment of its own: '
+            'python3 -m venv nanorocks && . nanorocks/bin/activate'
         )
     return f'pip install {packages}'

@@ -18,8 +18,8 @@ import yaml
 from decays import simulated_mixture, simulated_table, write_rows
 
 from nanorocks_ros.cli.main import main
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 
 SAMPLE = Path(__file__).parents[3] / 'bags' / 'tray_1_sample'
 FIGURES = ('decay.png', 'walls.png', 'width.png', 'cor_against_speed.png')

@@ -24,7 +24,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
 
 STEEL = """\
 materials:

@@ -21,7 +21,7 @@ def test_a_first_start_is_told_in_log_and_diagnostics_and_a_second_one_compiles_
         DiagnosticArray, '/diagnostics', lambda message: statuses.extend(message.status), 10
     )
     graph.node.create_subscription(Log, '/rosout', lines.append, 10)
-    first = graph.start('haff_fitter')
+    first = graph.start_program('haff_fitter')
     graph.until(lambda: any(status.message.startswith(COMPILING) for status in statuses), 300.0)
     (level,) = {status.level for status in statuses if status.message.startswith(COMPILING)}
     assert level == DiagnosticStatus.OK
@@ -29,7 +29,7 @@ def test_a_first_start_is_told_in_log_and_diagnostics_and_a_second_one_compiles_
     graph.until(lambda: not statuses[-1].message.startswith(COMPILING), 300.0)
     assert any(line.msg.startswith(COMPILING) for line in lines)
     assert graph.interrupt(first).code == 0
-    second = graph.start('haff_fitter')
+    second = graph.start_program('haff_fitter')
     statuses.clear()
     graph.until(lambda: len(statuses) >= 2)
     assert graph.interrupt(second).code == 0

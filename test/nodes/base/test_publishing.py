@@ -10,7 +10,7 @@ pytest.importorskip('rclpy')
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of
 from nanorocks_ros.records import TrayImage, TrayState
 from nanorocks_ros.wire import topics
 from nanorocks_ros.wire.array_layouts import from_array

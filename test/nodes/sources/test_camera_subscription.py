@@ -14,7 +14,11 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32MultiArray
 
 from nanorocks_ros.experiment.lens import Camera as CameraModel
-from nanorocks_ros.nodes.base.ros_messages import camera_info_message, image_message, qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import (
+    camera_info_message,
+    image_message,
+    qos_of,
+)
 from nanorocks_ros.records import NS
 from nanorocks_ros.wire import topics
 

@@ -8,7 +8,7 @@ pytest.importorskip('rclpy')
 
 from std_msgs.msg import Header
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of, time_message
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of, time_message
 from nanorocks_ros.nodes.sources.flow_control import FlowControl
 from nanorocks_ros.wire import topics
 

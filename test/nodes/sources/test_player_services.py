@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('rosbag2_interfaces', reason='needs rosbag2_interfaces')
 
-from nanorocks_ros.nodes.base.ros_messages import time_message
+from nanorocks_ros.nodes.base.communication.ros_messages import time_message
 from nanorocks_ros.nodes.sources.player_services import rosbag2_services
 from nanorocks_ros.recordings.bag.reader import open_bag
 

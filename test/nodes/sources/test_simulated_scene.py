@@ -8,7 +8,7 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of, stamp_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of, stamp_of
 from nanorocks_ros.settings import SceneSettings, SimulationSettings
 from nanorocks_ros.simulation.plate_scene.scene_geometry import scene_camera
 from nanorocks_ros.wire import topics

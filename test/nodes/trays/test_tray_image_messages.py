@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from nanorocks_ros.errors import FrameError
-from nanorocks_ros.nodes.base.ros_messages import image_message
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message
 from nanorocks_ros.nodes.trays.tray_image_messages import (
     color_frame,
     gray_frame,

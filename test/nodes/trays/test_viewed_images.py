@@ -16,7 +16,7 @@ pytest.importorskip('rclpy')
 from sensor_msgs.msg import Image
 
 from nanorocks_ros.dashboard.tray_pictures import LAYERS
-from nanorocks_ros.nodes.base.ros_messages import image_message, qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import image_message, qos_of
 from nanorocks_ros.wire import topics
 
 NS = 1_000_000_000

@@ -15,7 +15,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Float32MultiArray
 
-from nanorocks_ros.nodes.base.ros_messages import qos_of
+from nanorocks_ros.nodes.base.communication.ros_messages import qos_of
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
@@ -156,8 +156,12 @@ def test_a_recording_that_cannot_be_completed_gives_exit_code_1(graph, tmp_path)
 def test_a_player_without_pace_loses_nothing_on_its_way_into_a_recording(graph, tmp_path):
     """Frames are kept as they came, and the same ones make the same numbers."""
     path = tmp_path / 'bag'
-    pipeline = graph.start('pipeline', 'source:=topic', 'transport:=compressed', f'record:={path}')
-    player = graph.start(
+    # As a user starts them: forked at the same moment, on a busy machine, the first frames may
+    # come before the subscription is known on both sides.
+    pipeline = graph.start_program(
+        'pipeline', 'source:=topic', 'transport:=compressed', f'record:={path}'
+    )
+    player = graph.start_program(
         'bag_player', f'bag:={SAMPLE}', 'rate:=0.0', 'listeners:=1', 'start:=1.0', 'duration:=6.0'
     )
     assert graph.wait(player).code == 0

@@ -99,6 +99,20 @@ def test_every_collision_is_a_simulated_collision_of_those_two_beads(gas):
     assert wrong <= 1
 
 
+@pytest.mark.parametrize(('seen', 'compared'), [(1.01, 1.01), (0.99, 0.99), (1.06, 1.02)])
+def test_distances_are_compared_with_the_radii_that_show(seen, compared):
+    """All beads are told to be alike; nearer to the camera they and their distances are larger."""
+    half = 1e-3
+    before = 2e-3 * (TIMES[TIMES <= 0.6] - 0.6) - half
+    after = -1e-3 * (TIMES[TIMES > 0.6] - 0.6) - half
+    x = np.concatenate([before, after])
+    y = np.full_like(x, 7e-3)
+    paths = np.stack([np.column_stack([7e-3 + x, y]), np.column_stack([7e-3 - x, y])], axis=1)
+    tracks = [replace(record, radii=seen * record.radii) for record in tracks_of(paths)]
+    (pair,) = (each for each in _contacts_in(tracks) if isinstance(each, PairCollision))
+    assert pair.radii == pytest.approx(np.full(2, compared * 1e-3))
+
+
 def test_collisions_conserve_momentum_and_separate_along_the_normal(gas):
     for contact in gas[1]:
         if isinstance(contact, PairCollision):

@@ -18,7 +18,7 @@ from nanorocks_ros.pipeline.composition import Pipeline, trays_of
 from nanorocks_ros.records import ClusterEstimate, Frame, Notice, Quality, TrayImage
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_film import film
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
 LENS = Camera(width=640, height=420, focal=(560.0, 560.0), centre=(324.0, 208.0))
 

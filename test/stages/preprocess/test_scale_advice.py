@@ -11,7 +11,7 @@ from nanorocks_ros.errors import FrameError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Frame
 from nanorocks_ros.settings import PipelineSettings, with_values
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.scale_advice import scale_text
 from nanorocks_ros.stages.scale.picture_scale import PictureScale
 

@@ -16,7 +16,7 @@ from nanorocks_ros.settings import (
     with_values,
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.speed.crowded_structure_function import least_difference
 
 NS = 1e9

@@ -124,7 +124,39 @@ def test_beads_count_that_are_seen_in_two_frames_of_three():
     tracks = [*(replace(record, seen=slow) for record in tracks[:-2]), *tracks[-2:]]
     estimate = mean_speed(tracks, least_distance=PIXEL)
     assert estimate.window == pytest.approx(2.0 / RATE)
-    assert estimate.mean_projected_speed == pytest.approx(0.5 * (6e-3 + 3e-3), rel=0.01)
+    assert estimate.mean_projected_speed == pytest.approx(6e-3, rel=0.01)
+
+
+def test_fast_beads_that_are_lost_half_way_count_as_the_others():
+    velocities = np.zeros((40, 2))
+    velocities[:20, 0], velocities[20:, 0] = 3e-3, 9e-3
+    tracks = list(_tracks(velocities, 0.01 * PIXEL, 12))
+    # Half of the fast ones are not seen at the end.
+    late = replace(tracks[-1], seen=np.arange(40) < 30)
+    estimate = mean_speed([*tracks[:-1], late], least_distance=PIXEL)
+    assert estimate.mean_projected_speed == pytest.approx(6e-3, rel=0.01)
+
+
+@pytest.mark.parametrize('per_frame', [0.1, 0.2, 0.3])
+def test_paths_with_many_deflections_are_as_long_as_they_are(per_frame):
+    rng = np.random.default_rng(7)
+    beads, frames, steps = 10_000, 7, 40
+    speed = 4e-3
+    angles = rng.uniform(0.0, 2.0 * np.pi, beads)
+    places, position = [], np.zeros((beads, 2))
+    for step in range(frames * steps):
+        if step % steps == 0:
+            places.append(position.copy())
+        deflected = rng.random(beads) < per_frame / steps
+        angles[deflected] = rng.uniform(0.0, 2.0 * np.pi, np.count_nonzero(deflected))
+        position += speed / RATE / steps * np.column_stack([np.cos(angles), np.sin(angles)])
+    flight = list(_tracks(np.zeros((beads, 2)), 1e-3 * PIXEL, frames))
+    tracks = [
+        replace(record, positions=place) for record, place in zip(flight, places, strict=True)
+    ]
+    estimate = mean_speed(tracks, least_distance=PIXEL)
+    assert estimate.window == pytest.approx(2.0 / RATE)
+    assert estimate.mean_projected_speed == pytest.approx(speed, rel=0.004)
 
 
 def test_two_beads_or_two_frames_have_no_mean_speed():

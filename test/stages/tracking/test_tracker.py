@@ -18,7 +18,7 @@ from nanorocks_ros.settings import (
     with_values,
 )
 from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
-from nanorocks_ros.stages.preprocess.preprocessor import Preprocessor
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 

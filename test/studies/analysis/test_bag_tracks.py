@@ -13,14 +13,14 @@ import pytest
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import FrameError, RecordingError
-from nanorocks_ros.outputs import parquet as parquet_files
+from nanorocks_ros.outputs.tables import parquet as parquet_files
 from nanorocks_ros.recordings.bag.offered_topics import offered_topic
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.records import NS
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.studies.analysis.bag_tracks import track_bag
-from nanorocks_ros.studies.analysis.tracks_files import COLUMNS, write_tracks
+from nanorocks_ros.studies.analysis.results.tracks_files import COLUMNS, write_tracks
 from nanorocks_ros.studies.inspection.track_overlay import overlay
 from nanorocks_ros.studies.synthetic.film_bag import film_into_bag
 from nanorocks_ros.wire import topics

@@ -18,8 +18,8 @@ from nanorocks_ros.studies.analysis.cluster_packing import (
     compaction,
     measured_packing,
     paper_filling_of_level_area,
-    simulated_packing,
 )
+from nanorocks_ros.studies.analysis.simulated_packing import simulated_packing
 
 TRAY = load_trays()[1]
 STICKING = SimulationSettings(

@@ -15,7 +15,7 @@ from nanorocks_ros.recordings.messages.message_builders import image_message, ti
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.tray_camera.tray_renderer import TrayCamera
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
-from nanorocks_ros.studies.analysis.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
 from nanorocks_ros.studies.results.results_provenance import BAG_NAME
 from nanorocks_ros.wire import topics
 

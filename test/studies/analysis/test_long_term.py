@@ -20,8 +20,8 @@ from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, cycles_of
 from nanorocks_ros.studies.analysis.long_term import in_period, read_campaign, write_campaign
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.result_tables import read_columns
-from nanorocks_ros.studies.analysis.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
 
 
 @pytest.fixture(scope='module')

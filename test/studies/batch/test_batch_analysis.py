@@ -28,7 +28,7 @@ from nanorocks_ros.recordings.bag.find_bags import find_bags
 from nanorocks_ros.records import Quality
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, priors_in_words, with_values
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 from nanorocks_ros.studies.batch import batch_task
 from nanorocks_ros.studies.batch.batch_analysis import BagResults, BatchPlan, run_batch
 from nanorocks_ros.studies.batch.batch_store import BatchStore

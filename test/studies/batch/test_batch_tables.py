@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from nanorocks_ros.outputs.csv_tables import read_csv
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.csv_tables import read_csv
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.studies.batch.batch_tables import write_tables
 from nanorocks_ros.studies.batch.campaign_means import MEANS, Combined, CycleRow, Mean, TrayMeans
 

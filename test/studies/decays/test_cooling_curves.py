@@ -10,8 +10,8 @@ import pytest
 from decays import simulated_table, write_rows
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.records import (
     NS,
     Measured,
@@ -20,7 +20,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import Analysis, TrayResults
-from nanorocks_ros.studies.analysis.results_folder import write_results
+from nanorocks_ros.studies.analysis.results.results_folder import write_results
 from nanorocks_ros.studies.decays.cooling_curves import (
     check_errors,
     cooling_part,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from nanorocks_ros.outputs.csv_tables import write_csv
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.studies.decays.cooling_windows import CoolingWindow, cooling_window
 
 FIELDS = ('status', 'window_start', 'window_end', 'cooling_start')

@@ -9,9 +9,9 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.jobs.tasks import Workers
-from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.figure_style import MAP
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.decays.chi_square_map import chi_square
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, curve_at, read_curve

@@ -8,7 +8,7 @@ from contact_results import contact_results
 
 from nanorocks_ros.errors import FitError, RecordingError
 from nanorocks_ros.settings import PriorSettings
-from nanorocks_ros.studies.analysis.contact_tables import contacts_of_results
+from nanorocks_ros.studies.analysis.results.contact_tables import contacts_of_results
 from nanorocks_ros.studies.figures.impact_figure import ImpactData, impact_figure
 
 PRIOR = PriorSettings()

@@ -8,7 +8,7 @@ import pytest
 
 import nanorocks_ros as nr
 from nanorocks_ros.cli.main import main
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.studies.gas_statistics.statistics_files import TABLES
 from nanorocks_ros.studies.synthetic.film_bag import film_into_bag

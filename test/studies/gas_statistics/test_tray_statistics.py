@@ -11,8 +11,8 @@ import pytest
 from gas_tracks import tracked_gas, with_beads_lost
 
 from nanorocks_ros.errors import ConfigurationError, FitError
-from nanorocks_ros.outputs.csv_tables import read_csv
-from nanorocks_ros.outputs.table_files import PACKAGE
+from nanorocks_ros.outputs.tables.csv_tables import read_csv
+from nanorocks_ros.outputs.tables.table_files import PACKAGE
 from nanorocks_ros.studies.gas_statistics.statistics_figure import statistics_figure
 from nanorocks_ros.studies.gas_statistics.statistics_files import (
     TABLES,

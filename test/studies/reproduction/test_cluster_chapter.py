@@ -7,9 +7,9 @@ import math
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.outputs.csv_tables import write_csv
 from nanorocks_ros.outputs.html_report import NOT_KNOWN
-from nanorocks_ros.outputs.table_columns import float_columns
+from nanorocks_ros.outputs.tables.csv_tables import write_csv
+from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.studies.reproduction.campaign_cycle import RESULTS, CycleFiles
 from nanorocks_ros.studies.reproduction.chapters.cluster_chapter import (
     ClusterEnd,

@@ -12,7 +12,7 @@ from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError, RecordingError
 from nanorocks_ros.experiment.recorded_experiment import metadata_of_settings
 from nanorocks_ros.experiment.trays import load_trays, trays_text
-from nanorocks_ros.outputs.table_files import PACKAGE, write_package
+from nanorocks_ros.outputs.tables.table_files import PACKAGE, write_package
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.studies.results.results_provenance import (

@@ -16,7 +16,7 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     speed_left,
     spin_left,
 )
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turned_bead, turns
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     COUNTER,

@@ -37,7 +37,7 @@ from nanorocks_ros.simulation.engine.flight.pair_times import (
     minimum_image,
     speed_square,
 )
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turns
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turns
 from nanorocks_ros.simulation.engine.flight.unequal_drag import is_apart, with_least_separation
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,

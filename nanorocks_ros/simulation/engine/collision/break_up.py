@@ -17,7 +17,7 @@ from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
     energy_of,
 )
 from nanorocks_ros.simulation.engine.collision.rigid_bodies import set_fragment
-from nanorocks_ros.simulation.engine.flight.rigid_motion import (
+from nanorocks_ros.simulation.engine.flight.turning_motion import (
     angular_velocity,
     body_of,
     orientation,

@@ -12,7 +12,7 @@ from nanorocks_ros.simulation.engine.collision.rigid_bodies import (
     rotation_energy,
     velocity_of_body,
 )
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning
 from nanorocks_ros.simulation.engine.gas_state import (
     AGGREGATE_SPIN,
     FOLLOWING,

@@ -9,7 +9,8 @@ import math
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.numerics.compiled import inlined, kernel
-from nanorocks_ros.simulation.engine.flight.rigid_motion import (
+from nanorocks_ros.simulation.engine.flight.rotation_series import expand, rebase
+from nanorocks_ros.simulation.engine.flight.turning_motion import (
     ARM,
     CENTRE,
     FROM,
@@ -31,7 +32,6 @@ from nanorocks_ros.simulation.engine.flight.rigid_motion import (
     turn_power,
     turns,
 )
-from nanorocks_ros.simulation.engine.flight.rotation_series import expand, rebase
 from nanorocks_ros.simulation.engine.gas_state import (
     FOLLOWING,
     INERTIA,

@@ -28,9 +28,9 @@ from nanorocks_ros.simulation.engine.collision.rigid_bodies import (
     start_impact,
     velocity_of_body,
 )
-from nanorocks_ros.simulation.engine.flight.rigid_motion import body_of, turns, where_turning
 from nanorocks_ros.simulation.engine.flight.rotation_series import expand, rebase
 from nanorocks_ros.simulation.engine.flight.turning_contacts import largest_bend
+from nanorocks_ros.simulation.engine.flight.turning_motion import body_of, turns, where_turning
 from nanorocks_ros.simulation.engine.gas_state import (
     MERGE,
     MERGE_LOSS,

@@ -17,7 +17,6 @@ from nanorocks_ros.simulation.engine.collision.moving_walls import (
     largest_excursion,
     tray_displacement,
 )
-from nanorocks_ros.simulation.engine.flight.rigid_motion import where_turning
 from nanorocks_ros.simulation.engine.flight.turning_contacts import (
     CLOSED,
     LEAST_STEP,
@@ -29,6 +28,7 @@ from nanorocks_ros.simulation.engine.flight.turning_contacts import (
     largest_speed,
     step_at_rest,
 )
+from nanorocks_ros.simulation.engine.flight.turning_motion import where_turning
 from nanorocks_ros.simulation.engine.flight.unequal_drag import earliest_closing
 from nanorocks_ros.simulation.engine.gas_state import EPOCH, RADIUS, WALLS, State
 from nanorocks_ros.simulation.engine.vectors import length

@@ -43,8 +43,8 @@ from nanorocks_ros.simulation.engine.flight.gas_drag import (
     velocity_at,
 )
 from nanorocks_ros.simulation.engine.flight.pair_times import speed_square
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turns
 from nanorocks_ros.simulation.engine.flight.turning_contacts import ROUNDING
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turns
 from nanorocks_ros.simulation.engine.gas_state import (
     EPOCH,
     FIX,

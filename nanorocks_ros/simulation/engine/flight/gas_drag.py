@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.numerics.exponentials import decay_time, decayed
 from nanorocks_ros.physics.stokes_drag import TURNING_PER_MOVING
-from nanorocks_ros.simulation.engine.flight.rigid_motion import is_turning, turned_bead, turns
+from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import TIME, VX, VY, VZ, X, Y, Z
 
 if TYPE_CHECKING:

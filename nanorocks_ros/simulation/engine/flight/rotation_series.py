@@ -8,7 +8,7 @@ gets a new one. This holds for bodies of any shape, needs only + - * /, and its 
 grow: angular momentum is a constant of the motion, and energy follows from it and the
 orientation.
 
-Tested by ``test/simulation/engine/flight/test_rigid_motion.py``.
+Tested by ``test/simulation/engine/flight/test_turning_motion.py``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined, kernel
-from nanorocks_ros.simulation.engine.flight.rigid_motion import (
+from nanorocks_ros.simulation.engine.flight.turning_motion import (
     CENTRE,
     COLUMNS,
     FROM,
@@ -43,7 +43,7 @@ from nanorocks_ros.simulation.engine.flight.rigid_motion import (
 from nanorocks_ros.simulation.engine.vectors import cross, length
 
 if TYPE_CHECKING:
-    from nanorocks_ros.simulation.engine.flight.rigid_motion import Quaternion
+    from nanorocks_ros.simulation.engine.flight.turning_motion import Quaternion
     from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.vectors import Vector
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.flight.pair_times import is_rounding
-from nanorocks_ros.simulation.engine.flight.rigid_motion import (
+from nanorocks_ros.simulation.engine.flight.turning_motion import (
     MAX_BEND,
     MAX_SPIN,
     UNTIL,

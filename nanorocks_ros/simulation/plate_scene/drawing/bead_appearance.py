@@ -14,7 +14,7 @@ import numpy as np
 from nanorocks_ros.simulation.initial_state import inventory
 from nanorocks_ros.simulation.plate_scene.drawing.grains import FACETS, LOBES, SHAPE
 from nanorocks_ros.simulation.plate_scene.drawing.scene_bodies import GRAIN, SPHERE
-from nanorocks_ros.simulation.tray_camera.bead_looks import look_rows
+from nanorocks_ros.simulation.tray_camera.appearance_rows import look_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

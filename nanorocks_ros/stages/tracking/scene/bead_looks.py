@@ -9,8 +9,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from nanorocks_ros.stages.tracking.scene.disc_measures import join_outlines
+
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
@@ -47,6 +52,8 @@ class Candidates(NamedTuple):
     outlines : Outlines
     colours, around : ndarrays (n, 3)
         Inside and around.
+    floor : ndarray (n, 3)
+        Of the background inside; NaN where it is not known.
     moving : ndarray (n,)
         Share of each that differs from the background.
     aside : ndarray of bool, (n,)
@@ -56,8 +63,29 @@ class Candidates(NamedTuple):
     outlines: Outlines
     colours: NDArray[np.float64]
     around: NDArray[np.float64]
+    floor: NDArray[np.float64]
     moving: NDArray[np.float64]
     aside: NDArray[np.bool_]
+
+    def chosen(self, rows: NDArray[np.bool_]) -> Candidates:
+        """Some of the discs."""
+        return Candidates(
+            self.outlines.chosen(rows),
+            self.colours[rows],
+            self.around[rows],
+            self.floor[rows],
+            self.moving[rows],
+            self.aside[rows],
+        )
+
+
+def join_candidates(parts: Sequence[Candidates]) -> tuple[Candidates, NDArray[np.intp]]:
+    """Discs of several frames, and the number of the frame of each, (n,)."""
+    joined = Candidates(
+        join_outlines([part.outlines for part in parts]),
+        *(np.concatenate([part[k] for part in parts]) for k in range(1, 6)),
+    )
+    return joined, np.repeat(np.arange(len(parts)), [len(part.moving) for part in parts])
 
 
 class View(NamedTuple):

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+# Circles inside and outside a disc, in radii.
+_INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
 # A disc stays where another one lies within this part of its radius in so many other frames.
 _STAYS_SHARE, _STAYS_FRAMES = 0.25, 3
 
@@ -53,6 +55,13 @@ def apart(outlines: Outlines, radii: float = 1.0) -> NDArray[np.bool_]:
     keep = np.ones(len(discs), dtype=bool)
     leave_out_near(discs, order, radii, keep)
     return keep
+
+
+def colours_of(
+    color: NDArray[np.uint8], discs: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Median colours inside and around discs, (n, 3) each."""
+    return ring_colours(color, discs, _INSIDE), ring_colours(color, discs, _OUTSIDE)
 
 
 def ring_colours(

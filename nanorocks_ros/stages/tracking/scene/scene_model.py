@@ -6,21 +6,27 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook, Candidates, View
+from nanorocks_ros.stages.tracking.scene.bead_looks import (
+    BeadLook,
+    Candidates,
+    View,
+    join_candidates,
+)
 from nanorocks_ros.stages.tracking.scene.disc_measures import (
     apart,
+    colours_of,
     join_outlines,
     marked_shares,
     reduced,
-    ring_colours,
     staying,
 )
 from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
+from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
 from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, KnownBeads
+from nanorocks_ros.stages.tracking.scene.open_outlines import ends_of_others
 from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
 from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
 from nanorocks_ros.stages.tracking.scene.roamed_region import (
@@ -28,7 +34,7 @@ from nanorocks_ros.stages.tracking.scene.roamed_region import (
     RoamedRegion,
     roamed_region,
 )
-from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, scene_colours
+from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, enlarged, scene_colours
 from nanorocks_ros.stages.tracking.scene.smeared_discs import smeared_discs
 
 if TYPE_CHECKING:
@@ -45,10 +51,6 @@ _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
 _FEW_MOVING, _MORE_FRAMES = 8, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
-# Circles inside and outside a disc, in radii; and how much more contrast the background has where
-# a bead has left.
-_INSIDE, _OUTSIDE = (0.15, 0.45, 0.7), (1.2, 1.35)
-_LEFT_CONTRAST = 1.5
 # A step is that of a bead above this part of the usual one: those of shadows are softer.
 _LEAST_STEP = 0.35
 # Parts of the usual step of all edges that are tried for that of beads, until discs show.
@@ -61,9 +63,9 @@ _ALIKE_MOVING = 6.0
 _LEAST_RADIUS_PX = 6.5
 # Discs of the other brightness count when they are at least this part.
 _OTHER_SIGN_SHARE = 0.4
-_LEAST_CONTRAST = 6.0
-# A search begins where a bead is expected, and not again within this part of its radius.
-_SAME_SHARE = 0.2
+# A search begins where a bead is expected, and not again within this part of its radius where
+# that shows an outline with this support and step over the usual one.
+_SAME_SHARE, _SURE_SUPPORT, _SURE_STEP = 0.8, 0.7, 0.5
 # Frames in which discs are searched to learn from.
 _LEARNING_FRAMES = 8
 
@@ -86,6 +88,8 @@ class SceneModel:
     views : list of View
     sees_motion : bool
         Whether discs that move told what beads look like.
+    shadows : CastShadows or None
+        Those that show as discs.
     """
 
     def __init__(self, frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> None:
@@ -96,6 +100,7 @@ class SceneModel:
         self._look = look
         self.colours: SceneColours = scene_colours(frames, colour).enlarged(self.scale)
         self.sees_motion = False
+        self.shadows: CastShadows | None = None
         self._known: KnownBeads | None = None
         self._roamed: RoamedRegion | None = None
         self._learn(_some(frames, _LEARNING_FRAMES))
@@ -104,7 +109,7 @@ class SceneModel:
             self._learn_looks(_some(frames, _MORE_FRAMES))
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
-            large = [self._enlarged(frame) for frame in frames]
+            large = [enlarged(frame, self.scale) for frame in frames]
             region = roamed_region(large, self.colours, moved, self.views[-1].voting.step)
             # A bed of beads at rest is no clutter.
             if region.outside(self._rested * self.scale).sum() < len(moved):
@@ -130,7 +135,7 @@ class SceneModel:
         if hints is not None:
             half = 0.5 * (self.scale - 1.0)
             hints = hints * self.scale + np.array([half, half, 0.0])
-        color = self._enlarged(color)
+        color = enlarged(color, self.scale)
         moving = self.colours.moving(color)
         rows = [self._outlines(color, view, hints, moving) for view in self.views]
         # In the difference a shadow is part of its bead.
@@ -139,40 +144,21 @@ class SceneModel:
             [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
         )
         outlines = outlines.chosen(apart(outlines, self._look.apart))
+        colours, around = colours_of(color, outlines.discs)
+        floor = np.full_like(colours, math.nan)
         if self.colours.knows_background:
-            outlines = outlines.chosen(~self._left(color, outlines))
-        colours = ring_colours(color, outlines.discs, _INSIDE)
-        around = ring_colours(color, outlines.discs, _OUTSIDE)
+            floor, beside = colours_of(self.colours.background, outlines.discs)
+            radii = outlines.discs[:, 2] / self.scale
+            now = colours, around
+            here = ~left_behind(now, (floor, beside), self._known, radii)
+            here &= ~ends_of_others(color, moving, outlines.discs, outlines.support, now)
+            outlines = outlines.chosen(here)
+            colours, around, floor = colours[here], around[here], floor[here]
         moves = marked_shares(moving, outlines.discs)
         aside = np.zeros(len(moves), dtype=bool)
         if self._roamed is not None:
             aside = self._roamed.aside(color, outlines.discs)
-        return Candidates(reduced(outlines, self.scale), colours, around, moves, aside)
-
-    def _enlarged(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        if self.scale == 1:
-            return color
-        size = color.shape[1] * self.scale, color.shape[0] * self.scale
-        return np.asarray(cv2.resize(color, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
-
-    def _left(self, color: NDArray[np.uint8], outlines: Outlines) -> NDArray[np.bool_]:
-        """Discs that a bead has left: they show in the background, and less in the frame."""
-        discs = outlines.discs
-        inside, around = (
-            [ring_colours(image, discs, parts) for image in (color, self.colours.background)]
-            for parts in (_INSIDE, _OUTSIDE)
-        )
-        now, before = (
-            np.linalg.norm(own - other, axis=1) for own, other in zip(inside, around, strict=True)
-        )
-        left = before > _LEFT_CONTRAST * now + _LEAST_CONTRAST
-        if self._known is None or not left.any():
-            return np.asarray(left)
-        # Beside a dark wall the bright floor that a bead hides stands out more than the bead.
-        radii = reduced(outlines, self.scale).discs[left, 2]
-        here, gone = (self._known.distances(colours[left], radii) for colours in inside)
-        left[left] = gone < here
-        return np.asarray(left)
+        return Candidates(reduced(outlines, self.scale), colours, around, floor, moves, aside)
 
     def alike(self, candidates: Candidates) -> NDArray[np.bool_]:
         """Which of the discs look like beads."""
@@ -184,7 +170,11 @@ class SceneModel:
         distances = self._known.distances(candidates.colours, radii)
         rest = candidates.moving < MOVING_SHARE
         near = distances < np.where(rest, ALIKE, _ALIKE_MOVING)
-        return np.asarray(told & self._known.have_size(radii) & near)
+        alike = np.asarray(told & self._known.have_size(radii) & near)
+        if self.shadows is not None:
+            dark = darken(candidates.colours, candidates.floor)
+            alike &= ~self.shadows.among(candidates.outlines.discs, alike, dark)
+        return alike
 
     def _outlines(
         self,
@@ -196,11 +186,16 @@ class SceneModel:
         """Discs that show in a view, smeared ones where it moves; their steps over the usual."""
         picture = view.of(color, self.colours)
         starts = centres_of_all_sizes(picture, view.voting, _LEAST_VOTES)[:, :3]
-        if hints is not None and len(hints):
-            apart_from_hints = cKDTree(hints[:, :2]).query(starts[:, :2])[0]
-            elsewhere = apart_from_hints > _SAME_SHARE * view.voting.smallest
-            starts = np.concatenate([starts[elsewhere], hints])
-        outlines = fit_outlines(picture, starts, view.voting)
+        outlines = fit_outlines(picture, np.empty((0, 3)) if hints is None else hints, view.voting)
+        sure = outlines.discs[
+            (outlines.support >= _SURE_SUPPORT) & (outlines.steps >= _SURE_STEP * view.voting.step)
+        ]
+        if len(sure):
+            apart_from_sure = cKDTree(sure[:, :2]).query(starts[:, :2])[0]
+            starts = starts[apart_from_sure > _SAME_SHARE * view.voting.smallest]
+        outlines = join_outlines([outlines, fit_outlines(picture, starts, view.voting)])
+        if hints is not None:
+            starts = np.concatenate([hints, starts])
         steps = outlines.steps / view.voting.step
         good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
         good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * view.voting.noise)
@@ -211,7 +206,7 @@ class SceneModel:
         return join_outlines([sharp, smeared.chosen(smeared.steps >= _LEAST_STEP)])
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
-        chosen = [self._enlarged(frame) for frame in frames[:: max(1, len(frames) // 4)]]
+        chosen = [enlarged(frame, self.scale) for frame in frames[:: max(1, len(frames) // 4)]]
         self.views = self._plain_views(chosen)
         if self.colours.knows_background:
             self.views.append(self._view(chosen, moves=True, sign=1))
@@ -227,13 +222,18 @@ class SceneModel:
 
     def _learn_looks(self, frames: Sequence[NDArray[np.uint8]]) -> None:
         """Learn colours and sizes from the discs that move, or from all."""
-        self._known = None
-        rows = [self.candidates(frame) for frame in frames]
-        every = Candidates(
-            join_outlines([row.outlines for row in rows]),
-            *(np.concatenate([row[k] for row in rows]) for k in (1, 2, 3, 4)),
-        )
-        number = np.repeat(np.arange(len(rows)), [len(row.moving) for row in rows])
+        self._known = self.shadows = None
+        every, number = join_candidates([self.candidates(frame) for frame in frames])
+        self._know(every, number)
+        dark = darken(every.colours, every.floor)
+        alike = self.alike(every) & (every.moving >= MOVING_SHARE)
+        shadows = CastShadows.of(every.outlines.discs[alike], dark[alike], number[alike])
+        if shadows is not None:
+            self._know(every.chosen(~dark), number[~dark])
+            self.shadows = shadows
+
+    def _know(self, every: Candidates, number: NDArray[np.intp]) -> None:
+        """Learn from discs of frames with these numbers."""
         good = every.outlines.support >= _GOOD_SUPPORT
         moves = every.moving >= MOVING_SHARE
         moving = good & moves & ~staying(every.outlines.discs, moves, number)

@@ -28,7 +28,7 @@ from nanorocks_ros.stages.clusters.correlation_width import correlated
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 from nanorocks_ros.studies.analysis.cluster_packing import measured_packing
 from nanorocks_ros.studies.analysis.long_term import read_campaign
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 from nanorocks_ros.studies.figures.long_term_figure import long_term_figure
 from nanorocks_ros.studies.figures.packing_figure import packing_figure
 from nanorocks_ros.studies.reproduction.campaign_plan import FIRST_SHAKE, STICKING, plate_settings

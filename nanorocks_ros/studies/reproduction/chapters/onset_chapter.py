@@ -21,7 +21,7 @@ from nanorocks_ros.outputs.html_report import (
 )
 from nanorocks_ros.physics.dust_models import PAPER_STICKING_SPEEDS, collapse_time_factor
 from nanorocks_ros.physics.paper_clusters import paper_onset
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 from nanorocks_ros.studies.figures.dust_figure import (
     dust_figure,
     paper_thresholds,

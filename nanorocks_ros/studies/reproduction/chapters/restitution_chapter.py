@@ -29,7 +29,7 @@ from nanorocks_ros.physics.paper_formulas import (
     paper_wall_ellipse,
 )
 from nanorocks_ros.settings import PriorSettings
-from nanorocks_ros.studies.analysis.contact_tables import contacts_of_results
+from nanorocks_ros.studies.analysis.results.contact_tables import contacts_of_results
 from nanorocks_ros.studies.decays.cooling_curves import read_cycles, speed_table
 from nanorocks_ros.studies.decays.cooling_windows import cooling_window
 from nanorocks_ros.studies.figures.cor_figures import (
@@ -312,7 +312,7 @@ def _errata() -> list[Erratum]:
             f'{by_closed_form:.2f}. Its worked example gives {paper_restitution(*decay):.3f} as '
             f'printed, from a decay rate of {rate:.0f} /m, {rate / expected:.1f} times that of a '
             'gas with such beads and walls. Beads that stick cool as fast, and so do beads that '
-            'rub on floor and lid (docs/method/rotation.md).'
+            'rub on floor and lid.'
         ),
         Erratum(
             text=f'The axes of its wall ellipse are printed as a = {printed[0]:g}, b = '

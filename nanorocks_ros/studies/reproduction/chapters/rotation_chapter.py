@@ -60,9 +60,7 @@ def rotation_chapter(context: Context) -> Chapter:
                 text='The paper takes the wider spread of its restitutions below 5 mm/s for '
                 'energy from rotation. Constant friction and tangential restitution define '
                 'no speed at which rotation could begin. Noise of the mean speed explains the '
-                'spread: the band of Figure 13 is without rotation and widens in the same way. '
-                'docs/method/rotation.md has the details, with simulated rough beads, and names '
-                'the questions that remain open.'
+                'spread: the band of Figure 13 is without rotation and widens in the same way.'
             ),
         ],
     )  # fmt: skip

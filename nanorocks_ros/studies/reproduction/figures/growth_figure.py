@@ -13,7 +13,7 @@ import numpy as np
 from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import MEASURED, PAPER, TRUTH, TWO_COLUMNS
 from nanorocks_ros.physics.paper_clusters import paper_calibration
-from nanorocks_ros.studies.analysis.result_tables import read_columns
+from nanorocks_ros.studies.analysis.results.result_tables import read_columns
 from nanorocks_ros.studies.reproduction.campaign_plan import FIRST_SHAKE
 
 if TYPE_CHECKING:

@@ -68,3 +68,11 @@ def test_the_background_follows_slow_light_and_not_beads(film):
     inside = beads_in(truth[-1], frames[-1].shape)
     assert 2.0 < change[~inside].mean() < 5.0
     assert abs(change[inside].mean()) < 1.0
+
+
+@pytest.mark.parametrize('count', [1, 2, 3, 24, 300])
+def test_the_background_is_the_value_in_the_middle(count):
+    rng = np.random.default_rng(count)
+    frames = list(rng.integers(0, 256, (count, 30, 40, 3), dtype=np.uint8))
+    background = scene_colours(frames).background
+    assert np.array_equal(background, np.sort(frames, axis=0)[count // 2])
