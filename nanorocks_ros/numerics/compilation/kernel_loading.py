@@ -72,7 +72,7 @@ def _code_of(library: Any) -> _Code:
 class _Kept(NamedTuple):
     """A compiled version of a function, as kept on disk."""
 
-    library: _Code
+    code: _Code
     description: Any
     constants: _Constants
     signature: Any
@@ -84,13 +84,13 @@ class _LoadedLibrary(codegen.JITCodeLibrary):
     """Machine code of a function, and its intermediate code, not parsed yet."""
 
     def __init__(self, owner: Any, kept: _Kept) -> None:
-        _new_library(self, owner, kept.library.name)
-        self._bitcode = kept.library.bitcode
+        _new_library(self, owner, kept.code.name)
+        self._bitcode = kept.code.bitcode
         self._linking_libraries: list[Any] = []
         self._shared_module: Any = None
         self._disable_inspection = self._finalized = True
         engine = owner._engine
-        engine._ee.add_object_file(binding.ObjectFileRef.from_data(kept.library.machine_code))
+        engine._ee.add_object_file(binding.ObjectFileRef.from_data(kept.code.machine_code))
         described = kept.description
         engine._defined_symbols |= {described.llvm_func_name, described.llvm_cpython_wrapper_name}
         engine.finalize_object()
@@ -112,7 +112,7 @@ class _Format(caching.CompileResultCacheImpl):
         # numba leaves them out as well: they are not needed any more, and may not be picklable.
         described.typemap = described.calltypes = None
         return _Kept(
-            library=_code_of(result.library),
+            code=_code_of(result.library),
             description=described,
             constants=_constants(result.environment),
             signature=result.signature,
