@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.time import Time
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes.base.problems import DISK_LOW, Level, Problem
@@ -17,18 +18,26 @@ FULL = Problem(Level.WARN, 'the disk is full', DISK_LOW)
 
 @pytest.fixture
 def report(own_node):
-    """A node, and a function that gives its next status and the values in it."""
+    """A node, and a function that publishes its status now and gives it and the values in it."""
     node, spin_until = own_node
-    statuses = []
-    node.create_subscription(
-        DiagnosticArray, '/diagnostics', lambda message: statuses.extend(message.status), 10
-    )
+    messages = []
+    node.create_subscription(DiagnosticArray, '/diagnostics', messages.append, 10)
+    spin_until(lambda: messages)
 
     def next_status():
-        statuses.clear()
-        # The first one may have been sent before.
-        spin_until(lambda: len(statuses) >= 2)
-        return statuses[-1], {pair.key: pair.value for pair in statuses[-1].values}
+        asked_at = node.get_clock().now()
+        # A refusal is an error for 2 s only, which a busy machine may spend on waiting for the
+        # node's own report.
+        node.diagnostics.publish(node.topic_monitor.problems())
+
+        def answers():
+            return [
+                message for message in messages if Time.from_msg(message.header.stamp) >= asked_at
+            ]
+
+        spin_until(answers)
+        (status,) = answers()[0].status
+        return status, {pair.key: pair.value for pair in status.values}
 
     return node, next_status
 
