@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_likelihood import (
+    MIDDLE_EXCESS,
     OUTLIERS,
     PAIR_ERRORS,
-    RADIUS_ERRORS,
     VERTICAL_RATIOS,
 )
 from nanorocks_ros.inference.contacts.projected_collisions import (
@@ -57,10 +57,9 @@ each node, and its derivative by the slope of the restitution against the logari
 
 # Slope for that derivative, which is nearly constant.
 _SLOPE = 0.1
-# One vertical ratio and one error of the radii, in the middle of those that are likely: a test for
-# a change with speed depends on neither.
+# One vertical ratio, as one excess of the radii, in the middle of those that are likely: a test
+# for a change with speed depends on neither.
 _RATIO = VERTICAL_RATIOS[len(VERTICAL_RATIOS) // 2]
-_RADIUS_ERROR = RADIUS_ERRORS[len(RADIUS_ERRORS) // 2]
 
 
 def rebound_impacts(rebounds: Sequence[Rebound]) -> NDArray[np.float64]:
@@ -116,7 +115,7 @@ def collision_impacts(
     grid, ratios = np.linspace(0.0, 1.0, NODES), np.array([_RATIO])
     limits = sticking_speed, OUTLIERS
     level, tilted = (
-        projected_log_densities(seen, grid, ratios, _RADIUS_ERROR, limits, slope)[0]
+        projected_log_densities(seen, grid, ratios, MIDDLE_EXCESS, limits, slope)[0]
         for slope in (0.0, _SLOPE)
     )
     losses = [
@@ -127,7 +126,7 @@ def collision_impacts(
         )
         for collision in collisions
     ]
-    speed = (seen.approach + seen.parting) / horizontal_parts(seen, _RADIUS_ERROR)[0]
+    speed = (seen.approach + seen.parting) / horizontal_parts(seen, MIDDLE_EXCESS)[0]
     rows = np.column_stack([losses, speed, level, (tilted - level) / _SLOPE])
     return rows[speed > 0.0].astype(np.float32)
 
@@ -145,7 +144,7 @@ def impact_speeds(
         About that of the collisions.
     """
     seen = ProjectedCollisions.of(collisions).with_errors(PAIR_ERRORS)
-    part, spread = horizontal_parts(seen, _RADIUS_ERROR)
+    part, spread = horizontal_parts(seen, MIDDLE_EXCESS)
     both = seen.approach + seen.parting
     variance = seen.approach_variance + seen.parting_variance + 2.0 * seen.covariance
     speed = both / (part * (1.0 + restitution))

@@ -24,6 +24,9 @@ RANGE = 2.0
 """Range of speeds after an outlier, in units of the speed before."""
 
 _HEIGHTS = 20
+# Error of distances, relative to the sum of the radii, from the steps between values of
+# `RadiusExcess` that are compared.
+_SCALE_STEP = 0.001
 # Collisions per batch: their arrays over all tilts, restitutions and ratios stay in the cache.
 _IN_CACHE = 4
 # Standard deviations beyond which the tail of a Gaussian is below the precision of a double.
@@ -108,36 +111,55 @@ class ProjectedCollisions(NamedTuple):
         )
 
 
+class RadiusExcess(NamedTuple):
+    """By how much radii exceed those that distances at contact tell, relative.
+
+    Parameters
+    ----------
+    all_radii : float
+        Of all radii: outlines are blurred, and beads above the floor are nearer to the camera.
+    measured : float
+        Besides, of radii that are measured bead by bead: beads of a species differ in size.
+    """
+
+    all_radii: float
+    measured: float
+
+
 def _tilts(
-    seen: ProjectedCollisions, radius_error: float
+    seen: ProjectedCollisions, excess: RadiusExcess
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Tilts (vertical components of the line of centres), (1, h), and their probabilities, (m, h).
+    """Tilts (vertical components of the line of centres), (1, h), and densities, (m, h).
 
     Lines of centres are isotropic within the height of the tray; the projected distance is
-    measured with its error.
+    measured with its error. The densities are those of this distance, relative to the sum of the
+    radii, together with the tilt: their sum over the tilts tells how likely the radii are.
     """
     tilt = (np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS
-    reach = (seen.reach - radius_error * seen.measured)[:, None]
+    known = seen.reach - seen.measured
+    reach = seen.measured * (1.0 - excess.measured) + known
+    reach = ((1.0 - excess.all_radii) * reach)[:, None]
     free = seen.height[:, None] - 2.0 * seen.radii
     above = tilt * reach
     room = np.minimum(free.min(axis=1)[:, None], 0.5 * free.sum(axis=1)[:, None] - above)
-    square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None])
-              / seen.distance_error[:, None]) ** 2  # fmt: skip
     # In a tray as high as a bead all lines of centres are level.
     room[:, 0] = np.where(room.max(axis=1) > 0.0, room[:, 0], 1.0)
-    weight = np.maximum(room, 0.0) * np.exp(-0.5 * (square - square.min(axis=1)[:, None]))
-    total = weight.sum(axis=1)[:, None]
-    # Unknown where beads overlap in the picture, but no height is left for one above the other.
-    unknown = np.full_like(weight, np.nan)
-    return tilt, np.divide(weight, total, out=unknown, where=total > 0.0)
+    room = np.maximum(room, 0.0)
+    error = np.hypot(seen.distance_error, _SCALE_STEP * seen.reach)[:, None]
+    square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None]) / error) ** 2
+    density = seen.reach[:, None] / (_SQRT_2_PI * error) * np.exp(-0.5 * square)
+    return tilt, room / room.sum(axis=1)[:, None] * density
 
 
 def horizontal_parts(
-    seen: ProjectedCollisions, radius_error: float
+    seen: ProjectedCollisions, excess: RadiusExcess
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Horizontal part of the unit line of centres, (m,), and its standard deviation, (m,)."""
-    tilt, weight = _tilts(seen, radius_error)
+    tilt, density = _tilts(seen, excess)
     part = np.sqrt(1.0 - tilt[0] ** 2)
+    # Far from all tilts the nearest is taken.
+    density[:, 0] += _TINY
+    weight = density / density.sum(axis=1)[:, None]
     mean = weight @ part
     spread = np.sqrt(np.maximum(weight @ part**2 - mean**2, 0.0))
     return mean, spread
@@ -147,13 +169,13 @@ def projected_log_likelihood(
     seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
-    radius_error: float,
+    excess: RadiusExcess,
     limits: tuple[float, float],
 ) -> NDArray[np.float64]:
-    """Log likelihood, (r, n), of collisions for vertical ratios, (r,), at a given radius error."""
-    total: NDArray[np.float64] = projected_log_densities(
-        seen, grid, ratios, radius_error, limits
-    ).sum(axis=1)
+    """Log likelihood, (r, n), of collisions for vertical ratios, (r,), at a given excess."""
+    total: NDArray[np.float64] = projected_log_densities(seen, grid, ratios, excess, limits).sum(
+        axis=1
+    )
     return total
 
 
@@ -161,11 +183,11 @@ def projected_log_densities(
     seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
-    radius_error: float,
+    excess: RadiusExcess,
     limits: tuple[float, float],
     slope: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Log likelihood, (r, m, n), of each collision, as `projected_log_likelihood`.
+    """Log likelihood, (r, m, n), of distance and speeds of each collision.
 
     Parameters
     ----------
@@ -173,15 +195,17 @@ def projected_log_densities(
     grid : ndarray (n,)
         Restitutions, at the impact speed of each collision.
     ratios : ndarray (r,)
-    radius_error : float
+    excess : RadiusExcess
     limits : tuple of 2 floats
         Sticking speed, [m/s], and fraction of outliers.
     slope : float
         By how much the restitution falls where the impact speed rises by a factor e.
     """
     sticking_speed, outliers = limits
-    tilt, weight = _tilts(seen, radius_error)
+    tilt, weight = _tilts(seen, excess)
     likely = weight.max(axis=0) > _UNLIKELY
+    # One tilt at least.
+    likely[0] |= not likely.any()
     tilt, weight = tilt[:, likely], weight[:, likely]
     logs = np.empty((ratios.size, len(weight), grid.size))
     for k in range(0, len(weight), _IN_CACHE):
@@ -190,6 +214,7 @@ def projected_log_densities(
         kind = tilt[0, :, np.newaxis], sticking_speed, slope
         densities = _density(batch, grid, ratios, kind)
         density = np.einsum('mh,rmhn->rmn', weight[rows], densities)
+        # The distance of an outlier is anything up to the sum of the radii.
         outlier_density = outliers / (RANGE * batch.approach[:, np.newaxis])
         logs[:, rows] = np.log((1.0 - outliers) * density + outlier_density)
     return logs

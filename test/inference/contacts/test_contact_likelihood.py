@@ -14,6 +14,7 @@ from nanorocks_ros.inference.contacts.contact_likelihood import (
     pair_log_likelihood,
     rebound_log_likelihood,
 )
+from nanorocks_ros.inference.contacts.projected_collisions import RadiusExcess
 
 WALLS = np.linspace(0.6, 1.0, 161)
 PAIRS = np.linspace(0.4, 1.0, 121)
@@ -80,7 +81,7 @@ def test_intervals_from_collisions_have_the_stated_coverage():
 
 def test_log_likelihoods_of_parts_add_up():
     collisions = drawn_collisions(8, 150, 0.8)
-    values = {'vertical_ratios': (0.5,)}
+    values = {'vertical_ratios': (0.5,), 'excesses': (RadiusExcess(0.0, 0.0),)}
     parts = [
         pair_log_likelihood(part, PAIRS, **values) for part in (collisions[:70], collisions[70:])
     ]
@@ -95,7 +96,7 @@ def test_known_vertical_speeds_reduce_the_error():
 
 def test_radii_measured_too_large_do_not_bias_the_restitution():
     collisions = drawn_collisions(6, 150, 0.8, radius_error=0.04)
-    believed = _pairs(collisions, radius_errors=(0.0,))
+    believed = _pairs(collisions, excesses=(RadiusExcess(0.0, 0.0),))
     doubted = _pairs(collisions)
     assert abs(doubted.restitution - 0.8) < 3.0 * doubted.restitution_error
     assert abs(doubted.restitution - 0.8) < 0.5 * abs(believed.restitution - 0.8)

@@ -15,6 +15,7 @@ from nanorocks_ros.inference.contacts.dragged_contacts import dragged
 from nanorocks_ros.inference.contacts.impact_tables import impact_speeds
 from nanorocks_ros.inference.contacts.projected_collisions import (
     ProjectedCollisions,
+    RadiusExcess,
     projected_log_densities,
 )
 from nanorocks_ros.inference.contacts.restitution_exponent import MIN_CONTACTS
@@ -144,10 +145,9 @@ def test_an_impact_speed_is_known_within_its_error():
 def test_all_speeds_after_a_collision_together_are_certain():
     collision, _ = drawn_impact(np.random.default_rng(8), law(0.6, 0.8))
     seen = ProjectedCollisions.of([collision])
-    restitution = law(0.6, 0.8)
     part = math.sqrt(1.0 - 0.25**2)
 
-    def probability(*, tangent):
+    def probability(restitution, *, tangent):
         partings = np.linspace(-1.0, 6.0, 701) * seen.approach[0]
         density = []
         for parting in partings:
@@ -160,12 +160,15 @@ def test_all_speeds_after_a_collision_together_are_certain():
                 seen._replace(parting=np.array([parting])),
                 np.array([restitution(speed)]),
                 np.array([0.5]),
-                0.0,
+                RadiusExcess(0.0, 0.0),
                 (0.0, 1e-12),
                 slope,
             )
             density.append(math.exp(log[0, 0, 0]))
         return float(np.trapezoid(density, partings))
 
-    assert probability(tangent=True) == pytest.approx(1.0, abs=0.01)
-    assert probability(tangent=False) < 0.95
+    # Of the measured distance, whatever the speeds.
+    distance = probability(lambda _: 0.7, tangent=False)
+    falling = law(0.6, 0.8)
+    assert probability(falling, tangent=True) / distance == pytest.approx(1.0, abs=0.01)
+    assert probability(falling, tangent=False) / distance < 0.95
