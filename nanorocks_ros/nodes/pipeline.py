@@ -173,7 +173,8 @@ class PipelineNode(NanorocksNode):
 
     def _waiting_frames(self) -> Problem | None:
         waiting = self._background.waiting
-        if waiting <= _MANY_WAITING:
+        # A source that waits for the trays, as fast as possible, keeps all places taken.
+        if self._as_fast_as_possible or waiting <= _MANY_WAITING:
             return None
         return Problem(
             Level.WARN,
