@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+    from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.stages.restitution.restitution_method import Contacts
