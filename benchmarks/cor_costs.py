@@ -13,7 +13,8 @@ from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
-from nanorocks_ros.stages.restitution.restitution_methods import Decay, DecayLibraryMethod
+from nanorocks_ros.stages.restitution.decay_library_method import DecayLibraryMethod
+from nanorocks_ros.stages.restitution.restitution_method import Decay
 from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan, cool_node
 from nanorocks_ros.studies.sweeps.sweep_plan import sweep_plan
 from nanorocks_ros.studies.sweeps.sweep_runs import sweep

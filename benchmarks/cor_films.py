@@ -33,7 +33,7 @@ from nanorocks_ros.records import CorEstimate, CorStatus, PairCollision
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, with_values
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
-from nanorocks_ros.stages.restitution.restitution_methods import Decay
+from nanorocks_ros.stages.restitution.restitution_method import Decay
 
 # Films by truth; the goals refer to the first truth.
 _FILMS = {

@@ -24,8 +24,8 @@ from benchmarks.cor_costs import print_costs
 from benchmarks.drawn import varied
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.decay.decay_library_file import library_of
-from nanorocks_ros.inference.decay.decay_likelihood import DecayTables, decay_likelihood
-from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import DecayTables, tables_of
 from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.jobs.tasks import Workers, run_tasks

@@ -29,7 +29,8 @@ from nanorocks_ros.simulation.engine.gas import HardSphereGas
 from nanorocks_ros.simulation.ensemble import cooling_runs
 from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
 from nanorocks_ros.simulation.shaken_tray import after_shaking
-from nanorocks_ros.stages.restitution.restitution_methods import Decay, DecayLibraryMethod
+from nanorocks_ros.stages.restitution.decay_library_method import DecayLibraryMethod
+from nanorocks_ros.stages.restitution.restitution_method import Decay
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,8 +17,9 @@ from benchmarks.contacts import contacts_of, true_tracks
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.decay_library_file import library_of
-from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.settings import PriorSettings, SimulationSettings

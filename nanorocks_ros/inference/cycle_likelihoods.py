@@ -12,7 +12,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
 from nanorocks_ros.inference.flights.flight_losses import flight_table
 from nanorocks_ros.records import (
     UNKNOWN,

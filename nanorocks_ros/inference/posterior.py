@@ -23,7 +23,7 @@ from nanorocks_ros.numerics.splines import spline_basis
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+    from nanorocks_ros.inference.decay.decay_tables import DecayTables
     from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 
 # Points of the fine grid along each restitution.

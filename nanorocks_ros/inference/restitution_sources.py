@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-    from nanorocks_ros.inference.decay.decay_likelihood import DecayTables
+    from nanorocks_ros.inference.decay.decay_tables import DecayTables
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
     from nanorocks_ros.settings import PriorSettings

@@ -14,7 +14,7 @@ from nanorocks_ros.interface.inputs import described, told_settings
 from nanorocks_ros.interface.progress_bars import count_bar
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.interface.record_frames import table_frame
-from nanorocks_ros.interface.results.result import Result, Summary
+from nanorocks_ros.interface.results.result import NamedTable, Result, Summary
 from nanorocks_ros.outputs.figure_files import figure_file
 from nanorocks_ros.outputs.figure_style import TWO_COLUMNS
 from nanorocks_ros.outputs.named_recordings import with_recording
@@ -87,15 +87,12 @@ def track(
 class TrackResult(Result):
     """Tracks of all beads of a film. `nanorocks_ros.track` makes it."""
 
+    tracks = NamedTable('Place and velocity of each bead in each frame.')
+
     def __init__(self, tracked: TrackedBag, film: Path, notices: tuple[str, ...]) -> None:
         name = film.resolve().name
         super().__init__(provenance={'film': name}, notices=notices, usable=tracked.usable)
         self._tracked, self._film = tracked, film
-
-    @property
-    def tracks(self) -> pd.DataFrame:
-        """Place and velocity of each bead in each frame."""
-        return self.table('tracks')
 
     def _makers(self) -> dict[str, Callable[[], pd.DataFrame]]:
         own = self._tracked
@@ -116,7 +113,7 @@ class TrackResult(Result):
             for line in verdict.lines()
         ]
         return Summary(
-            title=f'tracks of {self.provenance["film"]}' + ('' if self.usable else ': NOT USABLE'),
+            title=f'tracks of {self.provenance["film"]}{self._verdict}',
             head=('tray', 'frames', 'tracks'),
             rows=tuple(rows),
             lines=(*lines, *self.notices),

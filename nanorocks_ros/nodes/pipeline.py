@@ -98,11 +98,21 @@ class PipelineNode(NanorocksNode):
         workers = declare(st.WorkSettings()).workers
         self.parameters.refuse_unknown()
         refuse_unused_parameters(self._source, self._bag_settings, self._pacing)
+        self._refuse_other_tray()
         self._as_fast_as_possible = self._source != 'topic' and self._pacing.rate == 0.0
         self._page = LivePageProcess(self, page, self._settings.trays_file) if with_page else None
         self._start_stages(workers)
         self._bag: BagFrames | None = None
         self._start_source(camera)
+
+    def _refuse_other_tray(self) -> None:
+        """Refuse to simulate a tray that is not measured, before anything is compiled."""
+        if self._source == 'simulator' and self._simulation.tray not in self._settings.trays:
+            raise ConfigurationError(
+                'parameter simulation.tray',
+                f'{self._simulation.tray} is not among trays {self._settings.trays}',
+                'set both',
+            )
 
     def _start_stages(self, workers: int) -> None:
         """Offer all topics, start the workers, and build the stages."""
@@ -173,7 +183,8 @@ class PipelineNode(NanorocksNode):
 
     def _waiting_frames(self) -> Problem | None:
         waiting = self._background.waiting
-        if waiting <= _MANY_WAITING:
+        # A source that waits for the trays, as fast as possible, keeps all places taken.
+        if self._as_fast_as_possible or waiting <= _MANY_WAITING:
             return None
         return Problem(
             Level.WARN,
@@ -209,12 +220,6 @@ class PipelineNode(NanorocksNode):
         self._rebuild(camera.topic)
 
     def _play_simulated(self) -> None:
-        if self._simulation.tray not in self._settings.trays:
-            raise ConfigurationError(
-                'parameter simulation.tray',
-                f'{self._simulation.tray} is not among trays {self._settings.trays}',
-                'set both',
-            )
         source = SimulatedTray(self, self._simulation, self._settings.trays_file)
 
         def emit(_: int, moment: TrayMoment) -> None:

@@ -45,6 +45,11 @@ class MeasuredInterval:
     lower: float = UNKNOWN
     upper: float = UNKNOWN
 
+    @property
+    def measured(self) -> Measured:
+        """Value and error, without the limits."""
+        return Measured(self.value, self.error)
+
 
 UNKNOWN_MEASURED = Measured()
 UNKNOWN_INTERVAL = Interval()

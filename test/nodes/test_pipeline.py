@@ -13,6 +13,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from nanorocks_ros.experiment.trays import load_trays
@@ -50,6 +51,34 @@ def test_a_bag_through_the_pipeline_gives_the_same_numbers_live_as_offline(graph
     assert finished.code == 0, finished.output
     assert 'Traceback' not in finished.output
     assert_same_numbers(arrays, rounding=0.0)
+
+
+def crowded_statuses(graph, rate):
+    """A pipeline that gets frames faster than it measures, and what it says meanwhile."""
+    texts = []
+
+    def keep(message):
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            if int(values.get('frames waiting for the trays', '0')) > 11:
+                texts.append(' '.join((status.message, *values.values())))
+
+    graph.node.create_subscription(DiagnosticArray, '/diagnostics', keep, 10)
+    options = f'bag:={SAMPLE}', 'loop:=true', 'workers:=0'
+    return graph.start('pipeline', 'source:=bag', f'rate:={rate}', *options), texts
+
+
+def test_as_fast_as_possible_waiting_frames_are_no_problem(graph):
+    process, texts = crowded_statuses(graph, rate=0.0)
+    graph.until(lambda: len(texts) >= 2)
+    assert [text for text in texts if 'too slow' in text] == []
+    assert graph.interrupt(process).code == 0
+
+
+def test_a_pace_that_the_pipeline_cannot_keep_is_a_problem(graph):
+    process, texts = crowded_statuses(graph, rate=100.0)
+    graph.until(lambda: any('frames wait for the trays' in text for text in texts))
+    assert graph.interrupt(process).code == 0
 
 
 def test_ctrl_c_ends_the_pipeline_and_its_processes(graph):

@@ -6,6 +6,7 @@ Tested by ``test/inference/test_posterior.py``.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,6 @@ from nanorocks_ros.inference.decay.decay_library import (
     UNITS,
     count_step,
 )
-from nanorocks_ros.inference.decay.decay_likelihood import DecayTables, RoughTables
 from nanorocks_ros.inference.decay.friction_terms import FRICTION
 from nanorocks_ros.numerics.smoothing import savitzky_golay
 
@@ -36,6 +36,61 @@ BEAD_POWER, WALL_POWER = 1.0 / 1.5, 0.5
 FRICTIONS = (0.004, 0.012, 0.035, 0.1)
 # Cells of ln t over which curves of the library are smoothed, and the order of the fits.
 _SMOOTH_CELLS, _SMOOTH_ORDER = 9, 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoughTables:
+    """A library of beads that rub on the same grid.
+
+    Parameters
+    ----------
+    friction : float
+        Of floor, lid and side walls.
+    mean
+        As of `DecayTables`.
+    bead_slope : ndarray (n_c * n_w, n_x)
+        Change of ln f for one standard deviation of one more nuisance, the friction of the beads.
+        Those of the others are those of smooth beads, and kept once.
+    """
+
+    friction: float
+    mean: NDArray[np.float64]
+    bead_slope: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecayTables:
+    """The library on a grid of restitutions.
+
+    Parameters
+    ----------
+    decays : DecayLibrary
+    restitution : ndarray (n_c,)
+    wall_restitution : ndarray (n_w,)
+    mean : ndarray (n_c * n_w, n_x)
+        Of ln f, over the priors of the nuisances.
+    slopes : ndarray (n_c * n_w, n_z, n_x)
+        Change of ln f for one standard deviation of each nuisance; without those of the camera.
+    corners : ndarray of int64, (n_c * n_w, 4)
+        Corners around each point, in the grid of the covariances.
+    shares : ndarray (n_c * n_w, 4)
+        Their weights.
+    start : tuple of 2 floats
+        Prior of the logarithm of the mean projected speed at the start, [m/s]: mean and standard
+        deviation.
+    rough : tuple of RoughTables
+        With rising friction; empty if the library knows smooth beads alone.
+    """
+
+    decays: DecayLibrary
+    restitution: NDArray[np.float64]
+    wall_restitution: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    shares: NDArray[np.float64]
+    start: tuple[float, float]
+    rough: tuple[RoughTables, ...] = ()
 
 
 @lru_cache(maxsize=16)

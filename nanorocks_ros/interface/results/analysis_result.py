@@ -16,7 +16,7 @@ from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import frame_of, joined, table_frame, with_column
 from nanorocks_ros.interface.results.combined_cycles import combined_frame
-from nanorocks_ros.interface.results.result import Result, Summary, run_words
+from nanorocks_ros.interface.results.result import NamedTable, Result, Summary, run_words
 from nanorocks_ros.outputs.html_report import with_interval
 from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.outputs.safe_text import counted
@@ -87,6 +87,15 @@ class AnalysisResult(Result):
     recording. `nanorocks_ros.analyse` and `nanorocks_ros.read` make it.
     """
 
+    speeds = NamedTable('Mean projected speed of the beads of each tray over time.')
+    tracks = NamedTable(
+        'Place and velocity of each bead in each frame; only with ``keep_tracks=True``.'
+    )
+    contacts = NamedTable('Collisions of two beads and rebounds from walls, a row for each.')
+    clusters = NamedTable('Cluster sizes, correlation lengths and sticking over time.')
+    cor = NamedTable('Coefficient of restitution of each cycle, with intervals of 68 and 95 %.')
+    combined = NamedTable('Coefficient of restitution of each tray by all cycles together.')
+
     def __init__(self, recordings: Sequence[AnalysedRecording], notices: tuple[str, ...]) -> None:
         own = [notice for recording in recordings for notice in recording.analysis.notices]
         errors = [str(error) for item in recordings if (error := item.analysis.error) is not None]
@@ -100,36 +109,6 @@ class AnalysisResult(Result):
             usable=all(recording.analysis.usable for recording in recordings),
         )
         self._recordings = tuple(recordings)
-
-    @property
-    def speeds(self) -> pd.DataFrame:
-        """Mean projected speed of the beads of each tray over time."""
-        return self.table('speeds')
-
-    @property
-    def tracks(self) -> pd.DataFrame:
-        """Place and velocity of each bead in each frame; only with ``keep_tracks=True``."""
-        return self.table('tracks')
-
-    @property
-    def contacts(self) -> pd.DataFrame:
-        """Collisions of two beads and rebounds from walls, a row for each."""
-        return self.table('contacts')
-
-    @property
-    def clusters(self) -> pd.DataFrame:
-        """Cluster sizes, correlation lengths and sticking over time."""
-        return self.table('clusters')
-
-    @property
-    def cor(self) -> pd.DataFrame:
-        """Coefficient of restitution of each cycle, with intervals of 68 and 95 %."""
-        return self.table('cor')
-
-    @property
-    def combined(self) -> pd.DataFrame:
-        """Coefficient of restitution of each tray by all cycles together."""
-        return self.table('combined')
 
     def save(self, folder: str | Path, form: str = FORMATS[0]) -> None:
         """Write tables and a results bag, as the command ``nanorocks analyse`` does.
@@ -266,7 +245,7 @@ class AnalysisResult(Result):
         if left_out > 0:
             lines.insert(0, f'{counted(left_out, "cycle")} more: see .cor')
         return Summary(
-            title=title + ('' if self.usable else ': NOT USABLE'),
+            title=title + self._verdict,
             head=('recording', 'tray', 'cycle', 'COR of beads', 'COR of walls', 'from'),
             rows=tuple(rows[:_MOST_SHOWN]),
             lines=tuple(python_words(line) for line in (*lines, *self.notices)),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.interface.python_words import python_words
 from nanorocks_ros.interface.record_frames import joined
-from nanorocks_ros.interface.results.result import Result, Summary, run_words
+from nanorocks_ros.interface.results.result import NamedTable, Result, Summary, run_words
 from nanorocks_ros.interface.table_reading import read_frame
 from nanorocks_ros.outputs.html_report import with_interval
 from nanorocks_ros.studies.measure.measure_tables import CONTACTS, MEAN_SPEEDS, RESTITUTIONS
@@ -41,6 +41,16 @@ class MeasureResult(Result):
         Of tables, pictures and ``report.html``.
     """
 
+    speeds = NamedTable('Mean and rms projected speed of the beads over time.')
+    tracks = NamedTable('Place and velocity of each bead in each frame.')
+    contacts = NamedTable('Collisions of two beads and rebounds from walls, a row for each.')
+    cor = NamedTable(
+        """Coefficients of restitution by contacts alone, with intervals of 68 and 95 %.
+
+        A row for collisions of two beads, for all walls, and for each wall.
+        """
+    )
+
     def __init__(self, folder: Path, notices: tuple[str, ...] = ()) -> None:
         measured = read_measured(folder)
         run = measured.provenance
@@ -51,29 +61,6 @@ class MeasureResult(Result):
         )
         self._measured = measured
         self.folder = folder
-
-    @property
-    def speeds(self) -> pd.DataFrame:
-        """Mean and rms projected speed of the beads over time."""
-        return self.table('speeds')
-
-    @property
-    def tracks(self) -> pd.DataFrame:
-        """Place and velocity of each bead in each frame."""
-        return self.table('tracks')
-
-    @property
-    def contacts(self) -> pd.DataFrame:
-        """Collisions of two beads and rebounds from walls, a row for each."""
-        return self.table('contacts')
-
-    @property
-    def cor(self) -> pd.DataFrame:
-        """Coefficients of restitution by contacts alone, with intervals of 68 and 95 %.
-
-        A row for collisions of two beads, for all walls, and for each wall.
-        """
-        return self.table('cor')
 
     @property
     def decay(self) -> AnalysisResult | None:
@@ -127,9 +114,9 @@ class MeasureResult(Result):
             own = tray['lines']
             unknown = [line for line in own[2:] if _UNKNOWN.search(line)]
             lines += [*tray['recognition'], *own[:2], *unknown, *tray['decay']]
-        verdict = '' if self.usable else ': NOT USABLE'
         return Summary(
-            title=f'{self.provenance["film"]}{verdict}; report in {self.folder / "report.html"}',
+            title=f'{self.provenance["film"]}{self._verdict}; '
+            f'report in {self.folder / "report.html"}',
             head=('tray', 'contacts of beads with', 'COR', 'contacts'),
             rows=tuple(rows),
             lines=(*map(python_words, lines), *self.notices),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import html
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from nanorocks_ros import __version__
 from nanorocks_ros.errors import ConfigurationError
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
     from matplotlib.figure import Figure
+    from typing_extensions import Self
 
 _CELL = 'style="text-align:left;padding:.15em .8em"'
 
@@ -67,6 +68,33 @@ class Summary:
             + (f'<ul>{items}</ul>' if items else '')
             + '</div>'
         )
+
+
+class NamedTable(property):
+    """A table of a `Result`, as its attribute of the same name.
+
+    Parameters
+    ----------
+    doc : str
+        What a row is.
+    """
+
+    def __init__(self, doc: str) -> None:
+        super().__init__()
+        # `property` leaves that of the class.
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._table = name
+
+    @overload
+    def __get__(self, result: None, owner: type | None = None) -> Self: ...
+
+    @overload
+    def __get__(self, result: Result, owner: type | None = None) -> pd.DataFrame: ...
+
+    def __get__(self, result: Result | None, owner: type | None = None) -> Self | pd.DataFrame:
+        return self if result is None else result.table(self._table)
 
 
 class Result:
@@ -130,6 +158,11 @@ class Result:
         figure = self._figure()
         _show_in_notebook(type(figure))
         return figure
+
+    @property
+    def _verdict(self) -> str:
+        """What a title says after its subject when the result must not be used."""
+        return '' if self.usable else ': NOT USABLE'
 
     def _makers(self) -> dict[str, Any]:
         """A function for each table."""

@@ -12,7 +12,7 @@ import pandas as pd
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.interface.record_frames import table_frame
-from nanorocks_ros.interface.results.result import Result, Summary
+from nanorocks_ros.interface.results.result import NamedTable, Result, Summary
 from nanorocks_ros.outputs.html_report import number
 from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.studies.synthetic.trajectory import event_table, trajectory_table
@@ -42,34 +42,19 @@ class SimulationResult(Result):
     Times count from the shaking event.
     """
 
+    speeds = NamedTable(
+        'Mean speed of the beads in space and in the picture, and bodies, over time.'
+    )
+    tracks = NamedTable(
+        'Place and velocity of each bead at each time; only with ``keep_tracks=True``.'
+    )
+    contacts = NamedTable('Every collision, rebound, merge and bead that stuck to a wall.')
+    clusters = NamedTable('Number of bodies over time: beads that stick together are one.')
+    cor = NamedTable('The true restitutions, a single row.')
+
     def __init__(self, simulated: SimulatedRuns) -> None:
         super().__init__(provenance={'simulation': simulated.provenance()}, notices=())
         self._simulated = simulated
-
-    @property
-    def speeds(self) -> pd.DataFrame:
-        """Mean speed of the beads in space and in the picture, and bodies, over time."""
-        return self.table('speeds')
-
-    @property
-    def tracks(self) -> pd.DataFrame:
-        """Place and velocity of each bead at each time; only with ``keep_tracks=True``."""
-        return self.table('tracks')
-
-    @property
-    def contacts(self) -> pd.DataFrame:
-        """Every collision, rebound, merge and bead that stuck to a wall."""
-        return self.table('contacts')
-
-    @property
-    def clusters(self) -> pd.DataFrame:
-        """Number of bodies over time: beads that stick together are one."""
-        return self.table('clusters')
-
-    @property
-    def cor(self) -> pd.DataFrame:
-        """The true restitutions, a single row."""
-        return self.table('cor')
 
     def _makers(self) -> dict[str, Callable[[], pd.DataFrame]]:
         return {

@@ -175,10 +175,7 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
             }
         weighted_size = fields.get('weighted_size', UNKNOWN_MEASURED)
         estimate = self._with_offset(estimate, weighted_size)
-        size = _combined(
-            Measured(estimate.cluster_size.value, estimate.cluster_size.error),
-            weighted_size,
-        )
+        size = _combined(estimate.cluster_size.measured, weighted_size)
         return replace(estimate, combined_size=size, **fields)
 
     def _with_offset(self, estimate: ClusterEstimate, weighted_size: Measured) -> ClusterEstimate:

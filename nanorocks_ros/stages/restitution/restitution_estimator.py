@@ -28,13 +28,9 @@ from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 from nanorocks_ros.stages.restitution.cycle_restitution import UNDETERMINED, CycleRestitution
 from nanorocks_ros.stages.restitution.cycle_speeds import certain_speeds, warnings_of
 from nanorocks_ros.stages.restitution.cycle_sticking import CycleSticking
-from nanorocks_ros.stages.restitution.restitution_methods import (
-    LARGEST_TENSION,
-    Decay,
-    DecayLibraryMethod,
-    PaperMethod,
-    RestitutionMethod,
-)
+from nanorocks_ros.stages.restitution.decay_library_method import DecayLibraryMethod
+from nanorocks_ros.stages.restitution.paper_method import PaperMethod
+from nanorocks_ros.stages.restitution.restitution_method import Decay, RestitutionMethod
 from nanorocks_ros.stages.restitution.species_decays import species_decays
 from nanorocks_ros.stages.stage import RestartingStage
 
@@ -52,6 +48,8 @@ _PUBLISHED = sorted(set(field_names(CycleRestitution)) & set(field_names(CorEsti
 _STAMP_ROUNDING_NS = 1_000_000
 # The first speed may come that much later for other reasons than a tray that oscillates.
 _LATE_NS = 500_000_000
+# Standard deviations by which decay, rebounds and collisions may disagree without a flag.
+_LARGEST_TENSION = 3.0
 RestitutionInput = SpeedEstimate | ContactOrFlight | Merge
 """The records from which restitutions are estimated."""
 
@@ -306,7 +304,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
     def _quality_of(self, result: CycleRestitution) -> Quality:
         """What a restitution and the merges say against the decay."""
         flags = {
-            Quality.INCONSISTENT: result.tension > LARGEST_TENSION,
+            Quality.INCONSISTENT: result.tension > _LARGEST_TENSION,
             Quality.ACCELERATED: result.accelerated,
             Quality.SPEED_DEPENDENT: result.speed_dependent,
             Quality.STICKING: self._sticking.first_merge_ns is not None,

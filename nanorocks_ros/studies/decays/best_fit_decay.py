@@ -13,12 +13,9 @@ from scipy import optimize
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.decay.decay_library_file import library_of
-from nanorocks_ros.inference.decay.decay_likelihood import (
-    DecayLikelihood,
-    DecayTables,
-    decay_likelihood,
-)
-from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import DecayTables, tables_of
+from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.settings import PipelineSettings
 

@@ -9,8 +9,9 @@ import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.decay.decay_library_file import library_of
-from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood, decay_likelihood
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import FRICTIONS, tables_of
+from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
 from nanorocks_ros.inference.posterior import posterior_of
 from nanorocks_ros.records import Measured
 from nanorocks_ros.settings import PriorSettings

@@ -1,4 +1,4 @@
-"""The two methods that turn a decay into a restitution: simulated decays, or the paper's form.
+"""The method that compares a decay with simulated decays, and adds what contacts say.
 
 Tested by ``test/stages/restitution/test_restitution_estimator.py``.
 """
@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import special
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
@@ -19,178 +18,50 @@ from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
-from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
+from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.inference.flights.flight_losses import flight_losses
 from nanorocks_ros.inference.posterior import check_walls
-from nanorocks_ros.inference.restitution_sources import (
-    RestitutionSources,
-    intervals_of,
-    restitution_sources,
-)
+from nanorocks_ros.inference.restitution_sources import restitution_sources
 from nanorocks_ros.inference.speed_dependence import RunningDependence, speed_dependence
-from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
-    ONE_SIGMA,
     UNKNOWN_MEASURED,
     CorRelation,
     Headline,
-    Interval,
     Measured,
     MeasuredInterval,
 )
 from nanorocks_ros.stages.flights.relative_drag import mean_relative_drag
 from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
+from nanorocks_ros.stages.restitution.haff_values import (
+    haff_time,
+    initial_speed,
+    paper_restitution,
+)
+from nanorocks_ros.stages.restitution.restitution_method import Decay
+from nanorocks_ros.stages.restitution.source_fields import (
+    NARROW,
+    by_source,
+    determined,
+    ends_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-    from nanorocks_ros.inference.decay.decay_likelihood import DecayLikelihood
+    from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
     from nanorocks_ros.settings import PipelineSettings
+    from nanorocks_ros.stages.restitution.restitution_method import Contacts
 
-# Largest standard deviation of a restitution that is given: a uniform one from 0 to 1 has 0.29.
-_LARGEST_DEVIATION = 0.2
 # Largest work of an acceleration on a bead that crosses the tray, over its mean square speed, with
 # which a decay still counts: speeds then change by a tenth.
 _MAX_WORK = 0.1
-LARGEST_TENSION = 3.0
-"""Standard deviations by which decay, rebounds and collisions may disagree without a flag."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decay:
-    """Speeds of one cycle.
-
-    Parameters
-    ----------
-    time : ndarray (n,), [s]
-        Since the shaking event.
-    speed, error : ndarray (n,), [m/s]
-    of_grains : bool
-        Whether there are grains among the beads.
-    """
-
-    time: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    error: NDArray[np.float64]
-    of_grains: bool = False
-
-
-def _ends(probability: float) -> NDArray[np.float64]:
-    """Probabilities of lower end, value and upper end of an interval."""
-    return np.array([0.5 - 0.5 * probability, 0.5, 0.5 + 0.5 * probability])
-
-
-_NARROW = _ends(ONE_SIGMA)
 # For the shape of a likelihood that says nothing.
 _ANY_TIMES = np.linspace(1.0, 10.0, 10)
 _ANY_DECAY = Decay(
     time=_ANY_TIMES, speed=5e-3 / (1.0 + _ANY_TIMES), error=1e-4 / (1.0 + _ANY_TIMES)
 )
-
-
-class Contacts(Protocol):
-    """Contacts and flights of a cycle, as `CycleContacts` sums them."""
-
-    @property
-    def body_rebounds(self) -> int:
-        """Rebounds of bodies of several beads among the contacts."""
-
-    @property
-    def flights(self) -> NDArray[np.float64]:
-        """Table of the flights."""
-
-    def terms(self, drag: float) -> ContactTerms:
-        """Likelihoods of the contacts in a gas with about this drag, [1/s]."""
-
-
-class RestitutionMethod(Protocol):
-    """A method that turns decays into restitutions; it keeps the evidence of finished cycles."""
-
-    relation: CorRelation
-    evidence: CycleLikelihoods | None
-
-    def estimate(
-        self, decay: Decay | None, contacts: Contacts, *, final: bool
-    ) -> CycleRestitution:
-        """Restitution of a cycle; raises FitError where the speeds do not fall.
-
-        Where beads stuck too soon for a decay there are contacts alone.
-        """
-
-    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
-        """Mean restitution of the cycles of some evidence, also of other recordings."""
-
-
-class PaperMethod:
-    """The closed form of [B19] on a fit of Haff's law.
-
-    Parameters
-    ----------
-    settings : PipelineSettings
-    tray : Tray
-    """
-
-    relation = CorRelation.PAPER
-
-    def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
-        self._probability = settings.cooling.probability
-        self._tray = tray
-        self.evidence: CycleLikelihoods | None = None
-
-    def estimate(
-        self, decay: Decay | None, contacts: Contacts, *, final: bool
-    ) -> CycleRestitution:
-        """Restitution of a cycle; the method of the paper does not use contacts.
-
-        Raises
-        ------
-        FitError
-            When the speeds do not fall.
-        """
-        del contacts
-        if decay is None:
-            return CycleRestitution()
-        fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
-        quantile, interval = _paper_interval(fit, self._tray, self._probability)
-        _, narrow = _paper_interval(fit, self._tray, ONE_SIGMA)
-        value, lower, upper = interval.value, interval.lower, interval.upper
-        if final:
-            own = CycleLikelihoods(
-                cycles=1, by_form=((value, (upper - lower) / (2.0 * quantile)),)
-            )
-            self.evidence = self.evidence + own if self.evidence else own
-        return CycleRestitution(
-            determined=True,
-            headline=Headline.DECAY,
-            restitution=interval,
-            restitution_lower_68=narrow.lower,
-            restitution_upper_68=narrow.upper,
-            paper_restitution=value,
-            reduced_chi_square=fit.reduced_chi_square,
-            mean_restitution=(
-                _measured(self.mean_of(self.evidence).restitution)
-                if self.evidence
-                else UNKNOWN_MEASURED
-            ),
-            initial_speed=_initial_speed(fit),
-            haff_time=_haff_time(fit),
-        )
-
-    def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
-        """Mean and standard error by the scatter of the cycles; of one, its own error."""
-        values, errors = np.array(evidence.by_form).T
-        mean, error, freedom = float(values.mean()), float(errors[0]), math.inf
-        if values.size > 1:
-            error = float(values.std(ddof=1) / math.sqrt(values.size))
-            freedom = values.size - 1.0
-        reach = error * float(special.stdtrit(freedom, 0.5 + 0.5 * self._probability))
-        return MeanRestitution(
-            cycles=evidence.cycles,
-            restitution=MeasuredInterval(mean, error, mean - reach, mean + reach),
-        )
 
 
 class DecayLibraryMethod:
@@ -224,7 +95,7 @@ class DecayLibraryMethod:
         self._drag_prior = Measured(prior.drag, prior.drag_error)
         self._relative_drag = mean_relative_drag(tray)
         check_walls((prior.min_wall_restitution, prior.max_wall_restitution))
-        self._ends = _ends(settings.cooling.probability)
+        self._ends = ends_of(settings.cooling.probability)
         self._probability = settings.cooling.probability
         self._include_inconsistent = settings.cooling.include_inconsistent
         self._dependence = RunningDependence()
@@ -263,16 +134,16 @@ class DecayLibraryMethod:
         )
         result = replace(
             self._of_decay(decay, likelihood, integrated, final=final),
-            **_by_source(sources, self._ends, has_decay=decay is not None),
+            **by_source(sources, self._ends, has_decay=decay is not None),
             rebounds=terms.rebounds,
             collisions=terms.collisions,
             body_rebounds=contacts.body_rebounds,
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
             acceleration=losses.magnitude(self._probability),
             accelerated=accelerated,
-            **dependence.fields(self._ends, _NARROW),
+            **dependence.fields(self._ends, NARROW),
         )
-        result = _determined(result, sources, self._ends)
+        result = determined(result, sources, self._ends)
         trusted = self._include_inconsistent or sources.headline is not Headline.CONTACTS
         trusted = trusted and not (accelerated or dependence.is_seen)
         own = CycleLikelihoods(cycles=1, decay=likelihood, contacts=terms, flights=flights)
@@ -333,7 +204,7 @@ class DecayLibraryMethod:
         own = own if trusted else own.without_decay()
         self.evidence = self.evidence + own if self.evidence else own
         mean = self.mean_of(self.evidence)
-        self._means_so_far = _measured(mean.restitution), _measured(mean.wall_restitution)
+        self._means_so_far = mean.restitution.measured, mean.wall_restitution.measured
         return self._means_so_far
 
     def mean_of(self, evidence: CycleLikelihoods) -> MeanRestitution:
@@ -374,7 +245,7 @@ class DecayLibraryMethod:
             MeasuredInterval(mean.value, mean.error, interval.lower, interval.upper)
             for mean, interval in zip(means, intervals, strict=True)
         )
-        narrow, narrow_walls = sources.intervals(_NARROW)
+        narrow, narrow_walls = sources.intervals(NARROW)
         return MeanRestitution(
             cycles=evidence.cycles,
             by_contacts=evidence.by_contacts,
@@ -390,7 +261,7 @@ class DecayLibraryMethod:
             headline=sources.headline,
             wall_friction=sources.wall_friction,
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
-            **dependence.fields(self._ends, _NARROW),
+            **dependence.fields(self._ends, NARROW),
         )
 
     def _speeds(self, decay: Decay, *, final: bool) -> CycleRestitution:
@@ -400,9 +271,9 @@ class DecayLibraryMethod:
                 # Nearly elastic beads may have no Haff time, but have a restitution.
                 fit = fit_haff(decay.time, decay.speed, decay.error, self._tray.count)
                 return CycleRestitution(
-                    initial_speed=_initial_speed(fit),
-                    haff_time=_haff_time(fit),
-                    paper_restitution=_paper_restitution(fit.decay_rate, self._tray),
+                    initial_speed=initial_speed(fit),
+                    haff_time=haff_time(fit),
+                    paper_restitution=paper_restitution(fit.decay_rate, self._tray),
                 )
         # A straight line through 1/v, as Haff's law is one; a proper fit takes too long.
         slope, offset = (float(number) for number in np.polyfit(decay.time, 1.0 / decay.speed, 1))
@@ -410,85 +281,9 @@ class DecayLibraryMethod:
         return CycleRestitution(
             initial_speed=Measured(1.0 / offset if falling else math.nan),
             haff_time=Measured(offset / slope if falling else math.nan),
-            paper_restitution=_paper_restitution(max(slope, 0.0), self._tray),
+            paper_restitution=paper_restitution(max(slope, 0.0), self._tray),
         )
 
 
 def _falls(decay: Decay) -> bool:
     return bool((decay.time - decay.time.mean()) @ np.log(decay.speed) < 0.0)
-
-
-def _determined(
-    result: CycleRestitution, sources: RestitutionSources, ends: NDArray[np.float64]
-) -> CycleRestitution:
-    """The result with the restitutions that the source of the headline determines."""
-    restitution, wall_restitution = sources.intervals(ends)
-    narrow, narrow_walls = sources.intervals(_NARROW)
-    walls: dict[str, Any] = {
-        'wall_restitution': wall_restitution,
-        'wall_restitution_lower_68': narrow_walls.lower,
-        'wall_restitution_upper_68': narrow_walls.upper,
-    }
-    if sources.means[0].error <= _LARGEST_DEVIATION:
-        return replace(
-            result,
-            determined=True,
-            restitution=restitution,
-            restitution_lower_68=narrow.lower,
-            restitution_upper_68=narrow.upper,
-            correlation=sources.correlation,
-            **walls,
-        )
-    if result.rebounds:
-        # Rebounds determine the walls even where nothing is known of the beads.
-        return replace(result, **walls)
-    return result
-
-
-def _by_source(
-    sources: RestitutionSources, ends: NDArray[np.float64], *, has_decay: bool
-) -> dict[str, Any]:
-    """The fields of a `CycleRestitution` that say what each source makes of the cycle."""
-    contacts, contact_walls = sources.contact_intervals(ends)
-    fields = {
-        'headline': sources.headline,
-        'contact_restitution': contacts,
-        'contact_wall_restitution': contact_walls,
-        'wall_friction': sources.wall_friction,
-    }
-    if not has_decay:
-        return fields
-    joint, joint_walls = intervals_of(sources.joint, ends)
-    decay, decay_walls = intervals_of(sources.decay, ends)
-    return {
-        **fields,
-        'tension': sources.joint.tension,
-        'joint_restitution': joint,
-        'joint_wall_restitution': joint_walls,
-        'decay_restitution': decay,
-        'decay_wall_restitution': decay_walls,
-    }
-
-
-def _paper_interval(fit: HaffFit, tray: Tray, probability: float) -> tuple[float, Interval]:
-    """Quantile of Student's t, and the restitution by the closed form with its interval."""
-    quantile = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + 0.5 * probability))
-    spread = math.exp(quantile * fit.log_decay_rate_error)
-    rates = fit.decay_rate, fit.decay_rate * spread, fit.decay_rate / spread
-    return quantile, Interval(*(_paper_restitution(rate, tray) for rate in rates))
-
-
-def _measured(mean: MeasuredInterval) -> Measured:
-    return Measured(mean.value, mean.error)
-
-
-def _initial_speed(fit: HaffFit) -> Measured:
-    return Measured(fit.initial_speed, fit.initial_speed_error)
-
-
-def _haff_time(fit: HaffFit) -> Measured:
-    return Measured(fit.haff_time, fit.haff_time_error)
-
-
-def _paper_restitution(rate: float, tray: Tray) -> float:
-    return paper_restitution_of_decay(rate, tray.diameter, tray.number_density)
