@@ -198,18 +198,15 @@ def pair_table(
     ]
     limits = sticking_speed, outliers
     ratios = np.array(vertical_ratios, dtype=np.float64)
-    by_excess: dict[RadiusExcess, NDArray[np.float64]] = {}
-    for excess in excesses:
-        # Without radii that are measured bead by bead their excess has no effect.
-        used = excess if seen.measured.any() else excess._replace(measured=0.0)
-        if used not in by_excess:
-            by_excess[used] = np.sum(
-                [projected_log_likelihood(part, grid, ratios, used, limits) for part in parts],
-                axis=0,
-            )
-        by_excess[excess] = by_excess[used]
-    table = np.stack([by_excess[excess] for excess in excesses], axis=1)
-    return table.reshape(-1, grid.size)
+    # Without radii that are measured bead by bead their excess has no effect.
+    has_effect = bool(seen.measured.any())
+    needed = [excess if has_effect else excess._replace(measured=0.0) for excess in excesses]
+    different = list(dict.fromkeys(needed))
+    by_excess = np.sum(
+        [projected_log_likelihood(part, grid, ratios, different, limits) for part in parts], axis=0
+    )
+    rows = [different.index(excess) for excess in needed]
+    return np.asarray(by_excess[:, rows].reshape(-1, grid.size))
 
 
 def _check_share(outliers: float) -> None:

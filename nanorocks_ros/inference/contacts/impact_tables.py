@@ -115,7 +115,7 @@ def collision_impacts(
     grid, ratios = np.linspace(0.0, 1.0, NODES), np.array([_RATIO])
     limits = sticking_speed, OUTLIERS
     level, tilted = (
-        projected_log_densities(seen, grid, ratios, MIDDLE_EXCESS, limits, slope)[0]
+        projected_log_densities(seen, grid, ratios, [MIDDLE_EXCESS], limits, slope)[0, 0]
         for slope in (0.0, _SLOPE)
     )
     losses = [

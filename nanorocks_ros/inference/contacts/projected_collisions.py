@@ -169,12 +169,12 @@ def projected_log_likelihood(
     seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
-    excess: RadiusExcess,
+    excesses: Sequence[RadiusExcess],
     limits: tuple[float, float],
 ) -> NDArray[np.float64]:
-    """Log likelihood, (r, n), of collisions for vertical ratios, (r,), at a given excess."""
-    total: NDArray[np.float64] = projected_log_densities(seen, grid, ratios, excess, limits).sum(
-        axis=1
+    """Log likelihood, (r, e, n), of collisions for vertical ratios, (r,), and excesses, (e,)."""
+    total: NDArray[np.float64] = projected_log_densities(seen, grid, ratios, excesses, limits).sum(
+        axis=2
     )
     return total
 
@@ -183,11 +183,11 @@ def projected_log_densities(
     seen: ProjectedCollisions,
     grid: NDArray[np.float64],
     ratios: NDArray[np.float64],
-    excess: RadiusExcess,
+    excesses: Sequence[RadiusExcess],
     limits: tuple[float, float],
     slope: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Log likelihood, (r, m, n), of distance and speeds of each collision.
+    """Log likelihood, (r, e, m, n), of distance and speeds of each collision.
 
     Parameters
     ----------
@@ -195,28 +195,30 @@ def projected_log_densities(
     grid : ndarray (n,)
         Restitutions, at the impact speed of each collision.
     ratios : ndarray (r,)
-    excess : RadiusExcess
+    excesses : sequence of RadiusExcess, (e,)
     limits : tuple of 2 floats
         Sticking speed, [m/s], and fraction of outliers.
     slope : float
         By how much the restitution falls where the impact speed rises by a factor e.
     """
     sticking_speed, outliers = limits
-    tilt, weight = _tilts(seen, excess)
-    likely = weight.max(axis=0) > _UNLIKELY
+    by_excess = [_tilts(seen, excess) for excess in excesses]
+    tilt, weights = by_excess[0][0], np.array([weight for _, weight in by_excess])
+    likely = weights.max(axis=(0, 1)) > _UNLIKELY
     # One tilt at least.
     likely[0] |= not likely.any()
-    tilt, weight = tilt[:, likely], weight[:, likely]
-    logs = np.empty((ratios.size, len(weight), grid.size))
-    for k in range(0, len(weight), _IN_CACHE):
+    tilt, weights = tilt[:, likely], weights[..., likely]
+    logs = np.empty((ratios.size, *weights.shape[:2], grid.size))
+    for k in range(0, weights.shape[1], _IN_CACHE):
         rows = slice(k, k + _IN_CACHE)
         batch = ProjectedCollisions(*(column[rows] for column in seen))
         kind = tilt[0, :, np.newaxis], sticking_speed, slope
         densities = _density(batch, grid, ratios, kind)
-        density = np.einsum('mh,rmhn->rmn', weight[rows], densities)
+        # Speeds depend on the tilt, and only the tilts depend on the radii.
+        density = np.einsum('emh,rmhn->remn', weights[:, rows], densities)
         # The distance of an outlier is anything up to the sum of the radii.
         outlier_density = outliers / (RANGE * batch.approach[:, np.newaxis])
-        logs[:, rows] = np.log((1.0 - outliers) * density + outlier_density)
+        logs[:, :, rows] = np.log((1.0 - outliers) * density + outlier_density)
     return logs
 
 

@@ -160,11 +160,11 @@ def test_all_speeds_after_a_collision_together_are_certain():
                 seen._replace(parting=np.array([parting])),
                 np.array([restitution(speed)]),
                 np.array([0.5]),
-                RadiusExcess(0.0, 0.0),
+                [RadiusExcess(0.0, 0.0)],
                 (0.0, 1e-12),
                 slope,
             )
-            density.append(math.exp(log[0, 0, 0]))
+            density.append(math.exp(log[0, 0, 0, 0]))
         return float(np.trapezoid(density, partings))
 
     # Of the measured distance, whatever the speeds.
