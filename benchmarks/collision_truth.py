@@ -10,6 +10,7 @@ ones.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -19,7 +20,9 @@ import numpy as np
 from benchmarks.drawn_films import measured
 from benchmarks.foreign_world import films_drawn
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contacts.contact_likelihood import EXCESSES, VERTICAL_RATIOS
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.records import NS, PairCollision
 
 if TYPE_CHECKING:
@@ -46,6 +49,7 @@ class _Match:
     Parameters
     ----------
     seen : PairCollision
+    true_radii : ndarray (2,), [m]
     true_distances, true_velocities : PairCollision
         With the truth in place of what was measured.
     told : PairCollision
@@ -53,9 +57,16 @@ class _Match:
     """
 
     seen: PairCollision
+    true_radii: NDArray[np.float64]
     told: PairCollision
     true_distances: PairCollision
     true_velocities: PairCollision
+
+    @property
+    def excess(self) -> float:
+        """Radii over true ones, less distance over the true one, relative."""
+        radii = float(self.seen.radii.sum() / self.true_radii.sum())
+        return 1.0 - _distance(self.seen) / _distance(self.true_distances) / radii
 
     @property
     def versions(self) -> tuple[PairCollision, ...]:
@@ -70,15 +81,25 @@ def report() -> None:
     for read_film in measured(films_drawn()):
         if read_film.is_unflagged:
             films[read_film.film.tray].append(read_film)
-    print('| tray | films | collisions | the true ones | distances, measured over true | ', end='')
-    print(' | '.join(_NAMES) + ' |')
-    print('| --- ' * (5 + len(_NAMES)) + '|')
+    columns = (
+        'tray',
+        'films',
+        'collisions',
+        'the true ones',
+        'distances, measured over true',
+        *_NAMES,
+        'excess of radii [%]',
+        'as told, error [%]',
+        'stated [%]',
+    )
+    print('| ' + ' | '.join(columns) + ' |')
+    print('| --- ' * len(columns) + '|')
     for tray, of_tray in sorted(films.items()):
         print(_row(tray, of_tray), flush=True)
 
 
 def _row(tray: int, films: list[ReadFilm]) -> str:
-    total, ratios = 0, []
+    total, ratios, excesses = 0, [], []
     likelihoods = np.zeros((len(_NAMES), _SHIFTS.size))
     for read_film in films:
         film = read_film.film
@@ -86,13 +107,38 @@ def _row(tray: int, films: list[ReadFilm]) -> str:
         found = (_match(film, read_film.result.epoch_ns, collision) for collision in collisions)
         matches = [match for match in found if match is not None]
         total += len(collisions)
+        excess = _excesses(matches)
+        if excess is not None:
+            excesses.append(excess)
         ratios += [_distance(match.seen) / _distance(match.true_distances) for match in matches]
         versions = zip(*(match.versions for match in matches), strict=True)
         for likelihood, version in zip(likelihoods, versions, strict=False):
             likelihood += _likelihood(version, film.beads)
     shifts = ' | '.join(map(_best, likelihoods))
     ratio = f'{np.median(ratios):.4f}' if ratios else ''
-    return f'| {tray} | {len(films)} | {total} | {len(ratios)} | {ratio} | {shifts} |'
+    told = ' | '.join(
+        f'{100.0 * median:.2f}' for median in np.median(np.reshape(excesses, (-1, 3)), axis=0)
+    )
+    return f'| {tray} | {len(films)} | {total} | {len(ratios)} | {ratio} | {shifts} | {told} |'
+
+
+def _excesses(matches: list[_Match]) -> tuple[float, float, float] | None:
+    """Of one film: true excess of the radii, absolute error of the one told, stated error.
+
+    None without true collisions of beads of known sizes.
+    """
+    alike = [match for match in matches if not match.seen.radius_errors.any()]
+    if not alike:
+        return None
+    true = float(np.median([match.excess for match in alike]))
+    table = ContactTerms.of(match.seen for match in alike).beads
+    by_excess = np.moveaxis(table.reshape(len(VERTICAL_RATIOS), len(EXCESSES), -1), 1, 0)
+    logs = np.array([float(log_sum(rows.reshape(-1, 1))[0]) for rows in by_excess])
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    told = np.array([excess.all_radii for excess in EXCESSES])
+    mean = float(weights @ told)
+    return true, abs(mean - true), math.sqrt(float(weights @ (told - mean) ** 2))
 
 
 def _counted(read_film: ReadFilm) -> Iterable[PairCollision]:
@@ -140,6 +186,7 @@ def _match(film: FilmTruth, epoch_ns: int, seen: PairCollision) -> _Match | None
     separation = line[:2] * film.radii[beads].sum()
     return _Match(
         seen=seen,
+        true_radii=film.radii[beads],
         told=replace(seen, radii=_told_radii(seen)),
         true_distances=replace(seen, separation=separation),
         true_velocities=replace(seen, before=before[:, :2], after=after[:, :2]),
