@@ -31,12 +31,11 @@ def report():
     print('| acceleration [mm/s²] | walls | measured | collisions | beads | rebounds | walls |')
     print('| --- | --- | --- | --- | --- | --- | --- |')
     for acceleration in ((0.0, 1e-9, 0.0), (0.004, -0.003, 0.0)):
+        runs = [tracks(seed, acceleration) for seed in range(1, RUNS + 1)]
         for known in (True, False):
             results = [
-                track_contacts(
-                    tracks(seed, acceleration), TRAY, PipelineSettings(), container_known=known
-                )
-                for seed in range(1, RUNS + 1)
+                track_contacts(run, TRAY, PipelineSettings(), container_known=known)
+                for run in runs
             ]
             sizes = [1e3 * result.acceleration.size for result in results]
             contacts = [contact for result in results for contact in result.contacts]

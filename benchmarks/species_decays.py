@@ -15,7 +15,9 @@ import numpy as np
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.decay.haff_fit import HaffFit, fit_haff
 from nanorocks_ros.settings import SimulationSettings
-from nanorocks_ros.simulation.shaken_tray import ShakenTray
+from nanorocks_ros.simulation.engine.gas import HardSphereGas
+from nanorocks_ros.simulation.initial_state import resting_beads, rules_of
+from nanorocks_ros.simulation.shaken_tray import after_shaking
 
 _CYCLES = 120
 _TIMES = 0.2 * np.arange(1, 101)
@@ -43,7 +45,6 @@ def cooled(tray: Tray, restitution: float) -> Mixture:
         wall_restitution=0.97,
         mean_speed=0.010,
         first_shake=0.0,
-        frame_rate=5.0,
         seed=4,
     )
     counts = [index.count for index in tray.species]
@@ -52,15 +53,15 @@ def cooled(tray: Tray, restitution: float) -> Mixture:
     speeds = np.empty((_CYCLES, _TIMES.size, 2))
     energies = np.empty_like(speeds)
     for run in range(_CYCLES):
-        gas = ShakenTray(settings, tray, run)
-        mass = density * np.pi / 6.0 * (2.0 * gas.radii) ** 3
-        for k, moment in enumerate(gas.moments(_TIMES.size + 1)):
-            if k:
-                square = (moment.velocities[:, :2] ** 2).sum(axis=1)
-                for index in (0, 1):
-                    mask = species == index
-                    speeds[run, k - 1, index] = np.sqrt(square[mask]).mean()
-                    energies[run, k - 1, index] = 0.5 * (mass * square)[mask].mean()
+        rules = rules_of(settings, tray, run)
+        beads = after_shaking(settings, rules, resting_beads(settings, tray, run), run, 0)
+        velocities = HardSphereGas(beads, rules).follow(_TIMES[-1], _TIMES).velocities
+        mass = density * np.pi / 6.0 * (2.0 * beads.radii) ** 3
+        squares = (velocities[:, :, :2] ** 2).sum(axis=2)
+        for index in (0, 1):
+            mask = species == index
+            speeds[run, :, index] = np.sqrt(squares[:, mask]).mean(axis=1)
+            energies[run, :, index] = 0.5 * (mass * squares)[:, mask].mean(axis=1)
     return Mixture(speeds=speeds, energies=energies)
 
 

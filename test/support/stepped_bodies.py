@@ -25,6 +25,9 @@ class _Body:
 
     def moved(self, step):
         """Centre and orientation after a step, by Runge and Kutta's method of order 4."""
+        centre = self.centre + step * self.velocity
+        if not self.moment.any():
+            return centre, self.turn
 
         def slope(turn):
             x, y, z = self.spin(turn)
@@ -37,7 +40,7 @@ class _Body:
         turned = self.turn + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         # Nearest rotation, by one step of Newton's method.
         turned = 1.5 * turned - 0.5 * turned @ turned.T @ turned
-        return self.centre + step * self.velocity, turned
+        return centre, turned
 
 
 class SteppedBodies:
@@ -76,8 +79,9 @@ class SteppedBodies:
         for body in self.bodies:
             centre, turn = body.moved(after)
             arms = body.arms @ turn.T
-            x[body.beads] = centre + arms
-            v[body.beads] = body.velocity + np.cross(body.spin(turn), arms)
+            x[body.beads], v[body.beads] = centre + arms, body.velocity
+            if body.moment.any():
+                v[body.beads] += np.cross(body.spin(turn), arms)
         return x, v
 
     def labels(self):

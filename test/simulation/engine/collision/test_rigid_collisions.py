@@ -45,7 +45,8 @@ def test_crowded_bodies_that_touch_in_many_places_end_no_run(kernel, restitution
     )
     beads = mixture(6, 24, rules, sizes=(0.6, 0.9))
     gas = HardSphereGas(beads, rules, kernel)
-    record = gas.follow(200.0, np.linspace(0.0, 200.0, 2001), most_events=3_000_000)
+    # With restitution 0 all that merge have done so at 20, and meet walls 90 000 times by 50.
+    record = gas.follow(60.0, np.linspace(0.0, 60.0, 601), most_events=3_000_000)
     assert gas.counts.merge >= (5 if restitution < 1.0 else 0)
     assert smallest_gap(record.positions, beads.radii, rules) > -1e-10
 

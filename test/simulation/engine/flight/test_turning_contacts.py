@@ -31,7 +31,7 @@ def test_events_and_velocities_are_those_of_an_independent_integration(seed):
     stepped = SteppedBodies(
         beads, rules.box, restitution=0.8, walls=0.9, sticking=rules.sticking_speed
     )
-    stepped.follow(END, 4e-3)
+    stepped.follow(END, 1e-2)
     assert gas.counts.merge >= 3
     assert [tuple(row)[1:4] for row in events] == [row[1:] for row in stepped.events]
     np.testing.assert_allclose(events['time'], [row[0] for row in stepped.events], atol=1e-7)
