@@ -62,7 +62,8 @@ test-oldest-meanwhile:
 # What takes minutes and only goes through, once more, what other tests go through (or compares a
 # picture, which another Matplotlib letters in another way; or reads texts of the repository alone):
 # analyses of whole bags go through all stages and the inference. The simulation is the same, bit
-# by bit, with all dependencies, and one command of it is enough.
+# by bit, with all dependencies, and one command of it is enough. Kills at each step of the work on
+# files (`-k`) are up to the operating system.
 ONCE := test/golden test/validation test/simulation test/inference test/stages test/pipeline \
         test/dashboard/test_page.py test/physics/test_confined_theory.py \
         test/studies/reproduction test/studies/batch test/studies/calibration \
@@ -84,7 +85,7 @@ test-oldest: ## Run the tests of the core, without ROS, with the oldest dependen
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
 	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
 	    PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
-	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES) $(ONCE)) $(PYTEST_ARGS)
+	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES) $(ONCE)) -k 'not at_any_step' $(PYTEST_ARGS)
 
 test-package: venv ## Make the wheel and run it where there is neither ROS nor this tree
 	@sh requirements/test_package.sh "$(CURDIR)/$(VENV)/bin/python" .venv-package

@@ -79,22 +79,22 @@ def test_the_measurement_reads_no_setting_that_is_said_to_concern_others_alone()
             assert changed_parts(BEFORE, after) & (Part.IMAGES | Part.MEASUREMENT), name
 
 
-def last_restitution(pipeline, change_after=None, settings=None):
+def last_restitution(settings, change_after=None, later=None):
     """The last estimate of the sample, with other settings from some frame on."""
-    estimates = []
+    pipeline, estimates = Pipeline(settings, 'sample'), []
     for number, frame in enumerate(BagFrames(SAMPLE).frames()):
         if number == change_after:
-            pipeline.adopt(settings, changed_parts(BEFORE, settings))
+            pipeline.adopt(later, changed_parts(settings, later))
         estimates += pipeline.push(frame)
     estimates += pipeline.flush()
     return [record for record in estimates if isinstance(record, CorEstimate)][-1]
 
 
 def test_a_prior_changed_in_a_cycle_gives_what_it_gives_from_the_start():
-    after = with_values(BEFORE, {'prior.min_wall_restitution': 0.96}, 'test')
-    changed = last_restitution(Pipeline(BEFORE, 'sample'), 400, after)
+    # Each live estimate takes as long as the last one.
+    before = with_values(BEFORE, {'cooling.update_interval': 5.0}, 'test')
+    after = with_values(before, {'prior.min_wall_restitution': 0.96}, 'test')
+    changed = last_restitution(before, 400, after)
     assert changed.status is CorStatus.FINAL
-    assert changed == last_restitution(Pipeline(after, 'sample'))
-    assert (
-        changed.wall_restitution != last_restitution(Pipeline(BEFORE, 'sample')).wall_restitution
-    )
+    assert changed == last_restitution(after)
+    assert changed.wall_restitution != last_restitution(before).wall_restitution

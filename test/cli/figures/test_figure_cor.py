@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 from decays import simulated_mixture, simulated_table, write_rows
+from picture_colours import colours_of
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.outputs.tables.csv_tables import write_csv
@@ -54,7 +55,7 @@ def folder(table, tmp_path_factory):
 def colours(path):
     picture = cv2.imread(str(path))
     assert min(picture.shape[:2]) > 400
-    return {tuple(colour) for colour in picture.reshape(-1, 3).tolist()}
+    return colours_of(picture)
 
 
 def test_all_figures_are_drawn_and_their_values_printed(table, folder, capsys):

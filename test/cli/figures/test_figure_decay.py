@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from decays import simulated_table, write_rows
 from matplotlib.colors import to_rgb
+from picture_colours import colours_of
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.outputs.figure_style import FITTED, MEASURED, PAPER
@@ -30,7 +31,7 @@ def bgr(colour):
 def colours(path):
     picture = cv2.imread(str(path))
     assert min(picture.shape[:2]) > 400
-    return {tuple(colour) for colour in picture.reshape(-1, 3)[::3].tolist()}
+    return colours_of(picture)
 
 
 def test_the_decay_is_drawn_with_both_fits(table, tmp_path, capsys):

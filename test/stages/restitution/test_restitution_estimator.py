@@ -34,8 +34,13 @@ NS = 1_000_000_000
 TRAY = load_trays()[1]
 
 
+# A live estimate every 5 s: each takes as long as the final one.
+SELDOM = {'cooling.update_interval': 5.0}
+
+
 def fitter(**values):
-    return RestitutionEstimator(with_values(PipelineSettings(), values, 'test'), TRAY)
+    settings = with_values(PipelineSettings(), {**SELDOM, **values}, 'test')
+    return RestitutionEstimator(settings, TRAY)
 
 
 def speed(time, value, cycle=1, start=0.0):
@@ -140,7 +145,7 @@ def test_next_to_elastic_beads_have_a_restitution_though_no_haff_time():
 
 def test_a_window_from_the_shake_to_the_next_day_is_no_trouble():
     speeds = [speed(t, 6e-3 / (1.0 + t / 5.0)) for t in np.geomspace(0.01, 900.0, 300)]
-    long = {'cooling.delay': 0.0, 'cooling.duration': 3600.0}
+    long = {'cooling.delay': 0.0, 'cooling.duration': 3600.0, 'cooling.update_interval': 60.0}
     stage = fitter(**long)
     all_estimates(stage, speeds)
     (final,) = stage.flush()
@@ -172,7 +177,7 @@ def test_walls_that_are_known_leave_the_beads_to_be_found():
 
 
 def test_the_interval_tightens_as_the_gas_cools():
-    estimates = all_estimates(fitter(), simulated_cycle())
+    estimates = all_estimates(fitter(**{'cooling.update_interval': 0.5}), simulated_cycle())
     widths = [record.restitution.upper - record.restitution.lower for record in estimates]
     assert len(estimates) > 20
     assert [record.status for record in estimates].count(CorStatus.FINAL) == 1
@@ -577,7 +582,8 @@ def test_speeds_of_grains_have_errors_of_their_own_by_either_method(method):
     exact = {'prior.grain_scale_error': 0.0, 'prior.grain_speed_bias': 0.01}
     widths = []
     for told in ({}, exact):
-        stage = RestitutionEstimator(with_values(PipelineSettings(), told, 'test'), tray)
+        values = with_values(PipelineSettings(), {**SELDOM, **told}, 'test')
+        stage = RestitutionEstimator(values, tray)
         *_, grains = [*all_estimates(stage, speeds), *stage.flush()]
         assert grains.status is CorStatus.FINAL
         assert grains.restitution.lower < 0.89 < grains.restitution.upper
@@ -595,7 +601,7 @@ def test_collisions_of_beads_among_grains_do_not_count(number, counted):
         for k in range(3, 15)
     ]
     rebounds = list(wall_rebounds(rng, 30, 2.0, 17.0))
-    stage = RestitutionEstimator(PipelineSettings(), tray)
+    stage = RestitutionEstimator(with_values(PipelineSettings(), SELDOM, 'test'), tray)
     *_, final = all_estimates(stage, by_stamp([*cooling_cycle(), *contacts, *rebounds]))
     assert (final.collisions, final.rebounds) == (counted, 30)
     assert math.isnan(final.contact_restitution.value) is (counted == 0)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from picture_colours import colours_of
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.figure_style import FITTED, MEASURED
@@ -45,8 +46,7 @@ def small(path):
 def test_the_figure_of_a_cycle_is_drawn(picture):
     pixels = cv2.imread(str(picture))
     assert min(pixels.shape[:2]) > 500
-    colours = {tuple(pixel) for pixel in pixels.reshape(-1, 3)[::7].tolist()}
-    assert {bgr(MEASURED), bgr(FITTED)} <= colours
+    assert {bgr(MEASURED), bgr(FITTED)} <= colours_of(pixels)
 
 
 def test_the_picture_of_the_readme_is_that_of_the_demo(picture):

@@ -14,13 +14,13 @@ from nanorocks_ros.studies.gas_statistics.velocity_samples import sample_velocit
 START = 1.75
 
 
-def measured_and_true(number, run, restitution=0.89):
+def measured_and_true(number, run):
     """Collisions of pairs by the estimate, its error, and those of the engine."""
-    gas = tracked_gas(number, run, restitution=restitution)
+    gas = tracked_gas(number, run)
     cycles = split_cycles(gas.tracks, START)
     n_species = len(gas.tray.species)
     samples = sample_velocities(cycles, n_species)
-    theory = theory_rates(confined_gas(gas.tray), restitution, 0.97)
+    theory = theory_rates(confined_gas(gas.tray), 0.89, 0.97)
     total, variance = 0.0, 0.0
     for kind in range(n_species):
         rate = collision_rate(cycles, samples, gas.tray, kind, theory[kind])

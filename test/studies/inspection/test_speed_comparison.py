@@ -9,6 +9,7 @@ import math
 import cv2
 import numpy as np
 import pytest
+from picture_colours import colours_of
 
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.experiment.trays import load_trays
@@ -131,9 +132,8 @@ def test_the_command_draws_one_cycle_and_writes_all_speeds(bag, bag_speeds, tmp_
     assert len(rows) == sum(counts.values())
     assert {row['method'] for row in rows} == set(counts)
     drawn = cv2.imread(str(picture))
-    colours = {tuple(colour) for colour in drawn.reshape(-1, 3).tolist()}
     # Tracking, structure function, selected speeds.
-    assert {(0x73, 0x9E, 0x00), (0xB2, 0x72, 0x00), (0, 0, 0)} <= colours
+    assert {(0x73, 0x9E, 0x00), (0xB2, 0x72, 0x00), (0, 0, 0)} <= colours_of(drawn)
     assert main(call) == 1
     assert 'exists already' in capsys.readouterr().err
 

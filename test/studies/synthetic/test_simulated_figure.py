@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from picture_colours import colours_of
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.tasks import Workers
@@ -36,8 +37,7 @@ def drawn(path, tray=1, samples=51, runs=3, **settings):
 def test_beads_and_decay_are_drawn(tmp_path, tray):
     picture = drawn(tmp_path / 'tray.png', tray)
     assert min(picture.shape[:2]) > 600
-    colours = {tuple(pixel) for pixel in picture.reshape(-1, 3).tolist()}
-    assert {MEAN, MARK} <= colours
+    assert {MEAN, MARK} <= colours_of(picture)
     # Beads in the colours of their speeds fill a good part of the trays.
     upper = picture[: picture.shape[0] // 2]
     coloured = upper.max(axis=2).astype(int) - upper.min(axis=2) > 60

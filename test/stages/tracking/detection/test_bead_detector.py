@@ -52,13 +52,14 @@ def test_the_radius_of_each_bead_is_measured_in_a_species_of_many_sizes():
 def _blurred_beads(places, blur):
     """Image of flat discs of tray 1 at places (n, 2) [px] through a lens with some blur [px]."""
     acrylic = load_trays()[1].species[0]
-    rows, columns = (np.indices((188 * 8, 188 * 8)) + 0.5) / 8
-    image = np.full((188 * 8, 188 * 8, 3), 150.0)
+    rows, columns = (axis / 8.0 for axis in np.ogrid[0.5 : 188 * 8, 0.5 : 188 * 8])
+    covered = np.zeros((188 * 8, 188 * 8), dtype=np.float32)
     for x, y in places:
-        covered = np.hypot(columns - x, rows - y) < 0.5 * acrylic.diameter * SCALE
-        image[covered] = np.array(acrylic.properties.color) * 0.8
-    image = cv2.GaussianBlur(image, (0, 0), 8.0 * blur)
-    return cv2.resize(image, (188, 188), interpolation=cv2.INTER_AREA).round().astype(np.uint8)
+        covered[np.hypot(columns - x, rows - y) < 0.5 * acrylic.diameter * SCALE] = 1.0
+    covered = cv2.GaussianBlur(covered, (0, 0), 8.0 * blur)
+    share = cv2.resize(covered, (188, 188), interpolation=cv2.INTER_AREA)[:, :, np.newaxis]
+    image = 150.0 + share * (np.array(acrylic.properties.color) * 0.8 - 150.0)
+    return image.round().astype(np.uint8)
 
 
 @pytest.mark.parametrize('gap', [2.0, 3.0, 4.0])

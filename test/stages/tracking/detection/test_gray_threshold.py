@@ -28,10 +28,8 @@ def _picture(shadows, blur, seed=1):
             radius = 0.5 * _SCALE * random.uniform(species.diameter_low, species.diameter_high)
             while True:
                 place = random.uniform(radius, size - radius)
-                if all(
-                    np.linalg.norm(place - other) > reach + radius + 2.0
-                    for other, reach in zip(places, radii, strict=True)
-                ):
+                apart = np.linalg.norm(np.reshape(places, (-1, 2)) - place, axis=1)
+                if np.all(apart > np.array(radii) + radius + 2.0):
                     break
             places.append(place)
             radii.append(radius)
