@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 _ITERATIONS, _TOLERANCE = 200, 1e-7
 # Share of the strays at the start, which are spread evenly over the range of the values.
 _STRAYS = 0.05
-# The range is wider than that of the values by this part of it on both sides.
-_MARGIN = 0.05
+# Smallest range of strays, in smallest deviations: those of equal values are no strays.
+_LEAST_RANGE = 50.0
 
 
 class Mixture(NamedTuple):
@@ -67,7 +67,7 @@ def fit_mixture(
     squares = np.bincount(nearest, off.min(axis=1) ** 2, minlength=count)
     deviations = np.maximum(np.sqrt(squares / parts), least_deviation)
     shares = (1.0 - _STRAYS) * parts / parts.sum()
-    extent = max(float(np.ptp(values)), least_deviation) * (1.0 + 2.0 * _MARGIN)
+    extent = max(float(np.ptp(values)), _LEAST_RANGE * least_deviation)
     before = -math.inf
     for _ in range(_ITERATIONS):
         density = shares * np.exp(-0.5 * ((values[:, None] - means) / deviations) ** 2)

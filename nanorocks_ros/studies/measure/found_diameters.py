@@ -20,16 +20,15 @@ from nanorocks_ros.experiment.unknown_diameters import (
     with_diameters,
 )
 from nanorocks_ros.experiment.yaml_lines import is_content
-from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel
 from nanorocks_ros.studies.analysis.scene_frames import scene_frames
 from nanorocks_ros.studies.measure.species_sizes import (
-    LEAST_DISCS,
     FoundDiameter,
     SpeciesLook,
+    single_size,
     species_sizes,
 )
 
@@ -43,8 +42,6 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Discs of one size differ by less than this part, as half of the middle 68 %.
-_MAX_SPREAD = 0.2
 # Beads that stand for those of unknown size until they are seen, and the most that are.
 _NOMINAL_MM = 1e-3
 _ANY_NUMBER = 2000
@@ -81,7 +78,7 @@ def guessed_diameter(
     for frame in frames:
         candidates = model.candidates(np.ascontiguousarray(frame))
         radii.append(candidates.outlines.discs[model.alike(candidates), 2])
-    size = _of_radii(radii)
+    size = single_size(np.concatenate(radii), len(frames))
     if isinstance(size, str):
         raise ConfigurationError('--diameter-px', f'cannot be guessed: {size}', 'measure a bead')
     return size
@@ -186,7 +183,8 @@ def _of_single_species(
     )
     detector = SceneDetector(replace(tray, species=(of_any_size,)), scale)
     detector.learn(frames)
-    size = _of_radii([detector.detect(frame)[0].radii for frame in frames])
+    radii = [detector.detect(frame)[0].radii for frame in frames]
+    size = single_size(np.concatenate(radii), len(frames))
     return size if isinstance(size, str) else (size,)
 
 
@@ -235,15 +233,3 @@ def _check_can_be_found(film: _Film, key: UnknownDiameter, name: str) -> None:
             f'lacks {DIAMETER}, and the film does not show this tray',
             'add it',
         )
-
-
-def _of_radii(radii: Sequence[NDArray[np.float64]]) -> FoundDiameter | str:
-    """The diameter by the radii in each frame, [px]; or why there is none."""
-    every = np.concatenate(radii)
-    if every.size < LEAST_DISCS:
-        return f'{counted(every.size, "disc")} in {counted(len(radii), "frame")}'
-    low, middle, high = (2.0 * value for value in np.quantile(every, [0.16, 0.5, 0.84]).tolist())
-    spread = 0.5 * (high - low) / middle
-    if spread > _MAX_SPREAD:
-        return f'no discs of one size stand out ({low:.0f} to {high:.0f} px)'
-    return FoundDiameter(middle, spread, every.size, len(radii))

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-LEAST_DISCS = 4
-"""Fewer discs tell no size."""
-
+# Fewer discs tell no size.
+_LEAST_DISCS = 4
+# Discs of one size differ by less than this part, as half of the middle 68 %.
+_MAX_SPREAD = 0.2
 # Error of a diameter that all discs of a film share: light, blur and shading at the outline, [px].
 _SHARED_ERROR_PX = 0.4
 # Frames that are searched, and those where they show few discs.
@@ -34,6 +35,8 @@ _RADIUS_TOLERANCE = 1.2
 _MAX_CHANGE, _MAX_SHARE_CHANGE = 0.1, 0.1
 # Sizes of beads that look alike differ by so many standard deviations of a radius.
 _APART = 3.0
+# Smallest part of the discs that has the sizes of beads.
+_LEAST_SHARE = 0.5
 # What is no bead shows up in fewer discs than this part of the rarest species.
 _STRAY_SHARE = 0.5
 # Largest difference of a diameter that is told from that of discs, as a part.
@@ -48,7 +51,7 @@ class FoundDiameter(NamedTuple):
     diameter : float, [px]
         In the middle of theirs.
     spread : float
-        Their relative scatter, as a standard deviation.
+        Their relative scatter: half of the middle 68 %, or a standard deviation.
     discs, frames : int
         So many discs in so many frames.
     """
@@ -89,6 +92,17 @@ class SpeciesLook(NamedTuple):
     colour: tuple[float, float, float] | None = None
     diameter: float = math.nan
     order: float = 0.0
+
+
+def single_size(radii: NDArray[np.float64], frames: int) -> FoundDiameter | str:
+    """The diameter of beads by the radii (n,) of the discs in so many frames; or why none."""
+    if radii.size < _LEAST_DISCS:
+        return f'{counted(radii.size, "disc")} in {counted(frames, "frame")}'
+    low, middle, high = (2.0 * value for value in np.quantile(radii, [0.16, 0.5, 0.84]).tolist())
+    spread = 0.5 * (high - low) / middle
+    if spread > _MAX_SPREAD:
+        return f'no discs of one size stand out ({low:.0f} to {high:.0f} px)'
+    return FoundDiameter(middle, spread, radii.size, frames)
 
 
 def species_sizes(
@@ -206,15 +220,20 @@ def _sizes_of(
 ) -> tuple[FoundDiameter, ...] | str:
     """Sizes of species that look alike by their radii in all frames; or why there are none."""
     count, species = len(log_radii), len(looks)
-    if count < LEAST_DISCS * species:
+    if species == 1:
+        size = single_size(np.exp(log_radii), frames)
+        return size if isinstance(size, str) else _in_order([size], looks)
+    if count < _LEAST_DISCS * species:
         return f'{counted(count, "disc")} in {counted(frames, "frame")}'
     mixture = likeliest_mixture(log_radii, species + 2, _LEAST_SPREAD, count / frames)
     seen = ' and '.join(f'{2.0 * size:.1f}' for size in np.exp(mixture.means).tolist())
     often = np.argsort(-mixture.shares, kind='stable')
     beads, others = np.sort(often[:species]), often[species:]
     rarest = mixture.shares[beads].min()
+    if mixture.shares.sum() < _LEAST_SHARE:
+        return f'{counted(count, "disc")} in {counted(frames, "frame")} have no sizes in common'
     if len(beads) < species or (mixture.shares[others] > _STRAY_SHARE * rarest).any():
-        return f'{species} of one look are told, and discs of {seen} px show'
+        return f'{species} of one look are told, and discs show with diameters of {seen} px'
     squares = mixture.deviations[beads] ** 2
     scatter = np.sqrt(0.5 * (squares[1:] + squares[:-1]))
     if (np.diff(mixture.means[beads]) < _APART * scatter).any():

@@ -1,7 +1,4 @@
-"""Discs of any size that some frames of a film show, of which nothing is told but a colour.
-
-Tested by ``test/stages/tracking/scene/test_scene_model.py``.
-"""
+"""Discs of any size that some frames of a film show, of which nothing is told but a colour."""
 
 from __future__ import annotations
 
