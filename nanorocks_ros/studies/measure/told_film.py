@@ -97,8 +97,7 @@ def sized_beads(filmed: FilmedTray, samples: FilmSamples) -> tuple[FilmedTray, s
     text = described_tray(nominal, samples.size).text
     section, species = film_section(text), load_trays(text)[1].species
     assert section is not None
-    column, row, width, height = section.region_px
-    crops = [frame[row : row + height, column : column + width] for frame in samples.frames]
+    crops = [section.crop(frame) for frame in samples.frames]
     looks = [
         SpeciesLook(
             sign=kind.appearance.sign,
