@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-MAX_STRETCH = 1.25
+MAX_STRETCH = 1.4
 """Largest ratio of two scales in the picture, of any places and directions, that is rectified."""
 
 
