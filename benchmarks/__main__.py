@@ -42,6 +42,7 @@ ALL = (
     'own_tray',
     'python_interface',
     'radii',
+    'found_sizes',
     'speed_trays',
     'speed_grains',
     'speed_accuracy',

@@ -19,12 +19,14 @@ class DrawnScene:
 
     `texture` is the amplitude of stains on the floor, `light` the fall of the light across the
     picture, `shadow` the darkness of cast shadows, `rim` the opacity of the rim of clear beads
-    (0: solid ones), `clutter` adds a rail, a stain and three holes that never move.
+    (0: solid ones), `clutter` adds a rail, a stain and three holes that never move. With `sizes`
+    beads have these radii in turn, and not any of `radii`; the colours follow them.
     """
 
     floor: tuple[float, float, float] = (150, 150, 150)
     colours: tuple[tuple[float, float, float], ...] = ((60, 60, 60),)
     radii: tuple[float, float] = (9.0, 9.0)
+    sizes: tuple[float, ...] = ()
     count: int = 25
     size: tuple[int, int] = (400, 300)
     speed: float = 2.0
@@ -50,6 +52,8 @@ def draw(scene):
     floor = _floor(scene, rng)
     places, velocities, radii = _start(scene, rng)
     kinds = rng.integers(0, len(scene.colours), scene.count)
+    if scene.sizes:
+        kinds = np.arange(scene.count) % len(scene.sizes) % len(scene.colours)
     frames, truth = [], []
     for _ in range(scene.frames):
         frame = floor.copy()
@@ -85,6 +89,8 @@ def _floor(scene, rng):
 def _start(scene, rng):
     columns, rows = scene.size
     radii = rng.uniform(*scene.radii, scene.count)
+    if scene.sizes:
+        radii = np.resize(scene.sizes, scene.count).astype(float)
     places = np.empty((0, 2))
     while len(places) < scene.count:
         radius = radii[len(places)]

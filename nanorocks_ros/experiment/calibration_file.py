@@ -137,6 +137,16 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
     ConfigurationError
         When it cannot be written.
     """
+    try:
+        _write_whole(path, calibration_text(calibration, remark))
+    except OSError as error:
+        raise ConfigurationError(
+            str(path), error.strerror or 'cannot be written', 'write elsewhere'
+        ) from error
+
+
+def calibration_text(calibration: Calibration, remark: str) -> str:
+    """The content of a calibration file; parameters as of `write_calibration`."""
     info = calibration.info
     lines = [f'# {remark}', 'camera_info:', f'  width: {info.width}', f'  height: {info.height}']
     lines.append(f'  distortion_model: {info.distortion_model}')
@@ -150,12 +160,7 @@ def write_calibration(calibration: Calibration, path: Path, remark: str) -> None
     lines.append('trays:')
     for number, region in sorted(calibration.regions.items()):
         lines.append(f'  {number}: [{", ".join(str(side) for side in region)}]')
-    try:
-        _write_whole(path, '\n'.join(lines) + '\n')
-    except OSError as error:
-        raise ConfigurationError(
-            str(path), error.strerror or 'cannot be written', 'write elsewhere'
-        ) from error
+    return '\n'.join(lines) + '\n'
 
 
 def _write_whole(path: Path, text: str) -> None:

@@ -11,7 +11,6 @@ import yaml
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.appearance import AUTO, Appearance, read_appearance
-from nanorocks_ros.experiment.film_section import SECTION
 from nanorocks_ros.experiment.materials import (
     GRAM_PER_CUBIC_CENTIMETRE,
     Look,
@@ -35,6 +34,9 @@ from nanorocks_ros.limits import BEADS
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
+
+FILM_SECTION = 'film'
+"""Name of the section of a trays file that says where the tray is in its film."""
 
 MILLIMETRE = 1e-3
 # Beads of a species that is not counted: what fits side by side, and not more than these.
@@ -133,7 +135,7 @@ class _TrayFile(YamlLines):
     def trays(self, root: yaml.Node | None) -> dict[int, Tray]:
         if root is None:
             raise self.error(None, 'is empty', 'describe at least one tray under "trays:"')
-        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials', SECTION})
+        top = self.mapping(root, {'trays'}, {'densities_g_cm3', 'materials', FILM_SECTION})
         self._read_materials(top)
         trays = {}
         for key, node in self.pairs(top['trays']):

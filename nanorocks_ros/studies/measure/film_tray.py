@@ -15,11 +15,10 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.appearance import AUTO, COLOUR_FORMS, LOOKS, is_colour
 from nanorocks_ros.experiment.film_section import FilmSection
+from nanorocks_ros.experiment.perspective import MAX_STRETCH, Perspective, clockwise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 # A bead of unknown size counts as one of the flight: the constants of the stages suit it.
 _NOMINAL_DIAMETER = 2e-3
@@ -108,7 +107,8 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
     """
     if not filmed.beads:
         raise ConfigurationError('--diameter-px', 'is needed', 'measure a bead in the picture')
-    region = _region(filmed.corners_px, size)
+    oblique = _perspective(filmed, size)
+    region = _region(filmed.corners_px, size) if oblique is None else (0, 0, *oblique.size_px)
     _check_beads(filmed.beads, region)
     scale, scale_notice = _scale(filmed, region)
     largest = max(beads.diameter or beads.diameter_px / scale for beads in filmed.beads)
@@ -118,6 +118,8 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
         region_px=region,
         scale_known=_is_scale_known(filmed),
         container_known=known and bool(filmed.corners_px),
+        corners_px=() if oblique is None else oblique.corners_px,
+        picture_px=size,
     )
     sides = [region[2] / scale, region[3] / scale]
     if known:
@@ -126,6 +128,11 @@ def described_tray(filmed: FilmedTray, size: tuple[int, int]) -> DescribedTray:
     if filmed.height is not None:
         sides.append(max(filmed.height, largest))
     notices = [scale_notice, *_guesses(filmed)]
+    if oblique is not None:
+        notices.append(
+            f'the container is seen at an angle, scales differ by {oblique.stretch - 1.0:.0%}; '
+            'its floor is rectified, and what is higher is seen displaced'
+        )
     return DescribedTray(
         text=_text(filmed, section, sides),
         notices=tuple(notice for notice in notices if notice),
@@ -189,7 +196,6 @@ def _region(
             f'{column} {row} to {right} {bottom} lie outside the picture of {size[0]}x{size[1]}',
             'give columns and rows in px of the film',
         )
-    _check_rectangle(corners, (low, high))
     if right - column < 16 or bottom - row < 16:
         raise ConfigurationError(
             '--corners', f'are {right - column}x{bottom - row} px apart', 'give opposite corners'
@@ -197,23 +203,46 @@ def _region(
     return column, row, right - column, bottom - row
 
 
-def _check_rectangle(
-    corners: tuple[tuple[float, float], ...], box: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> None:
-    """Refuse four corners of a container that is not upright and straight in the picture."""
+def _perspective(filmed: FilmedTray, size: tuple[int, int]) -> Perspective | None:
+    """How four corners are seen at an angle; None for others, and for an upright rectangle."""
+    corners = filmed.corners_px
     if len(corners) != 4:
-        return
-    (left, top), (right, bottom) = box
+        return None
+    _region(corners, size)
+    (left, top), (right, bottom) = np.min(corners, axis=0), np.max(corners, axis=0)
     upright = (left, top), (right, top), (right, bottom), (left, bottom)
     off = max(min(math.dist(corner, told) for told in corners) for corner in upright)
-    if off > _MAX_SKEW * min(right - left, bottom - top):
+    if off <= _MAX_SKEW * min(right - left, bottom - top):
+        return None
+    points = np.array(clockwise(corners))
+    following = np.roll(points, -1, axis=0)
+    along, down, back, up = np.hypot(*(following - points).T).tolist()
+    x, y = points.T
+    area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    if filmed.sides is not None:
+        ratio = filmed.sides[0] / filmed.sides[1]
+    else:
+        # A rectangle that is turned in the picture: its sides are right as they are seen.
+        ratio = (along + back) / (down + up)
+        diagonals = math.dist(points[0], points[2]) / math.dist(points[1], points[3])
+        if max(abs(along / back - 1.0), abs(down / up - 1.0), abs(diagonals - 1.0)) > _MAX_SKEW:
+            raise ConfigurationError(
+                '--corners',
+                f'form no upright rectangle: one is {off:.0f} px off, and its sides are not told',
+                'add --sides-mm LENGTH WIDTH, film straight from above, or calibrate the camera '
+                '(`nanorocks calibrate`); two opposite corners take the box around the container '
+                'as it is',
+            )
+    width, height = math.sqrt(area * ratio), math.sqrt(area / ratio)
+    perspective = Perspective(clockwise(corners), (round(width), round(height)))
+    if perspective.stretch > MAX_STRETCH:
         raise ConfigurationError(
             '--corners',
-            f'form no upright rectangle: one is {off:.0f} px off, so that one scale does not hold '
-            'everywhere',
-            'film straight from above, turn the camera, or calibrate it (`nanorocks calibrate`); '
-            'two opposite corners take the box around the container as it is',
+            f'scales differ by {perspective.stretch - 1.0:.0%} over the container, more than '
+            f'{MAX_STRETCH - 1.0:.0%}',
+            'film it from straight above, or correct --sides-mm and --corners',
         )
+    return perspective
 
 
 def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float, str]:

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import cv2
 import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError
@@ -19,12 +20,17 @@ from nanorocks_ros.experiment.unknown_diameters import (
     with_diameters,
 )
 from nanorocks_ros.experiment.yaml_lines import is_content
-from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel
 from nanorocks_ros.studies.analysis.scene_frames import scene_frames
+from nanorocks_ros.studies.measure.species_sizes import (
+    FoundDiameter,
+    SpeciesLook,
+    single_size,
+    species_sizes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -32,43 +38,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.experiment.tray_cells import Polygon
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import PipelineSettings
 
-# Discs of one size differ by less than this part, as half of the middle 68 %.
-_MAX_SPREAD = 0.2
-_LEAST_DISCS = 4
 # Beads that stand for those of unknown size until they are seen, and the most that are.
 _NOMINAL_MM = 1e-3
 _ANY_NUMBER = 2000
 _REMEDY = (
     f'measure a bead and write {DIAMETER}, or mark it: nanorocks tray FILM --browse -o mine.yaml'
 )
-
-
-class FoundDiameter(NamedTuple):
-    """Diameter of the discs that a film shows.
-
-    Parameters
-    ----------
-    diameter : float, [px]
-        Their median.
-    spread : float
-        Half of the range of the middle 68 %, over it.
-    discs, frames : int
-        So many discs in so many frames.
-    """
-
-    diameter: float
-    spread: float
-    discs: int
-    frames: int
-
-    def __str__(self) -> str:
-        return (
-            f'{self.diameter:.1f} px +- {100.0 * self.spread:.0f} %, the median of '
-            f'{counted(self.discs, "disc")} in {counted(self.frames, "frame")}'
-        )
 
 
 class FoundTrays(NamedTuple):
@@ -99,7 +78,7 @@ def guessed_diameter(
     for frame in frames:
         candidates = model.candidates(np.ascontiguousarray(frame))
         radii.append(candidates.outlines.discs[model.alike(candidates), 2])
-    size = _of_radii(radii)
+    size = single_size(np.concatenate(radii), len(frames))
     if isinstance(size, str):
         raise ConfigurationError('--diameter-px', f'cannot be guessed: {size}', 'measure a bead')
     return size
@@ -133,13 +112,14 @@ def with_found_diameters(
         return FoundTrays(settings)
     name = 'trays file' if is_content(file) else file
     film = _with_nominal_beads(settings, unknown, told, bag, image_topic)
-    diameters, notices = {}, []
     for key in unknown:
-        size = _of_species(film, key, name)
+        _check_can_be_found(film, key, name)
+    sizes = _sizes(film, unknown, name)
+    diameters, notices = {}, []
+    for key, size in sizes.items():
         diameters[key] = size.diameter / film.scale / MILLIMETRE
-        material = film.trays[key.tray].species[key.species].material
         notices.append(
-            f'{name}: the diameter of {material} in tray {key.tray} is found in the film: '
+            f'{_place(film, key, name, "the diameter of ")} is found in the film: '
             f'{diameters[key]:.4g} mm at {film.scale:.6g} px/m, from {size}; '
             f'{DIAMETER}: {diameters[key]:.4g} keeps it'
         )
@@ -169,48 +149,87 @@ def _with_nominal_beads(
     return _Film(load_trays(text), recorded.preprocess.pixels_per_metre, frames)
 
 
-def _of_species(film: _Film, key: UnknownDiameter, name: str) -> FoundDiameter:
-    """The diameter of the discs that look like beads of a species."""
-    tray = film.trays[key.tray]
-    species = tray.species[key.species]
-    where = f'{name}: {species.material} in tray {key.tray}'
-    _check_can_be_found(film, tray, key, where)
-    of_any_size = replace(
-        species, diameter_low=math.nan, diameter_high=math.nan, count=_ANY_NUMBER
+def _place(film: _Film, key: UnknownDiameter, name: str, before: str = '') -> str:
+    """A species, for errors and notices."""
+    return (
+        f'{name}: {before}{film.trays[key.tray].species[key.species].material} in tray {key.tray}'
     )
-    detector = SceneDetector(replace(tray, species=(of_any_size,)), film.scale)
-    frames = film.frames[key.tray]
+
+
+def _sizes(
+    film: _Film, unknown: Sequence[UnknownDiameter], name: str
+) -> dict[UnknownDiameter, FoundDiameter]:
+    """The diameters that are not told, from the discs that look like these beads."""
+    sizes: dict[UnknownDiameter, FoundDiameter] = {}
+    for number in dict.fromkeys(key.tray for key in unknown):
+        keys = [key for key in unknown if key.tray == number]
+        tray, frames = film.trays[number], film.frames[number]
+        if len(tray.species) == 1:
+            found = _of_single_species(tray, film.scale, frames)
+        else:
+            found = _of_several_species(tray, film.scale, frames, [key.species for key in keys])
+        if isinstance(found, str):
+            problem = f'its diameter cannot be found: {found}'
+            raise ConfigurationError(_place(film, keys[0], name), problem, _REMEDY)
+        sizes |= {key: found[key.species] for key in keys}
+    return sizes
+
+
+def _of_single_species(
+    tray: Tray, scale: float, frames: Sequence[NDArray[np.uint8]]
+) -> tuple[FoundDiameter, ...] | str:
+    of_any_size = replace(
+        tray.species[0], diameter_low=math.nan, diameter_high=math.nan, count=_ANY_NUMBER
+    )
+    detector = SceneDetector(replace(tray, species=(of_any_size,)), scale)
     detector.learn(frames)
-    size = _of_radii([detector.detect(frame)[0].radii for frame in frames])
-    if isinstance(size, str):
-        raise ConfigurationError(where, f'its diameter cannot be found: {size}', _REMEDY)
-    return size
+    radii = [detector.detect(frame)[0].radii for frame in frames]
+    size = single_size(np.concatenate(radii), len(frames))
+    return size if isinstance(size, str) else (size,)
 
 
-def _check_can_be_found(film: _Film, tray: Tray, key: UnknownDiameter, where: str) -> None:
-    """Refuse beads that the film does not show, and several species."""
-    if tray.species[key.species].appearance is None:
+def _of_several_species(
+    tray: Tray, scale: float, frames: Sequence[NDArray[np.uint8]], unknown: Sequence[int]
+) -> tuple[FoundDiameter, ...] | str:
+    looks = []
+    for k, species in enumerate(tray.species):
+        look = species.appearance
+        looks.append(
+            SpeciesLook(
+                sign=0 if look is None else look.sign,
+                colour=species.properties.color if look is None else look.colour,
+                diameter=math.nan if k in unknown else species.diameter * scale,
+            )
+        )
+    return species_sizes(frames, looks, lambda places: _inside(tray, places / scale))
+
+
+def _inside(tray: Tray, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which places (n, 2), [m], are inside the tray and on no mask."""
+
+    def within(polygon: Polygon) -> NDArray[np.bool_]:
+        # In a precision that suits the single floats of these polygons.
+        corners = np.array(polygon, dtype=np.float32)
+        sides = [cv2.pointPolygonTest(corners, place, False) for place in places.tolist()]
+        return np.array(sides) >= 0.0
+
+    inside = np.ones(len(places), dtype=bool) if tray.inside is None else within(tray.inside)
+    for mask in tray.masks:
+        inside &= ~within(mask)
+    return inside
+
+
+def _check_can_be_found(film: _Film, key: UnknownDiameter, name: str) -> None:
+    """Refuse beads that the film does not show, and those of the flight."""
+    if film.trays[key.tray].species[key.species].appearance is None:
         raise ConfigurationError(
-            where, f'lacks {DIAMETER}', 'add it, or "look: auto" to have it found in the film'
+            _place(film, key, name),
+            f'lacks {DIAMETER}',
+            'add it, or "look: auto" to have it found in the film',
         )
     if key.tray not in film.frames:
         raise ConfigurationError(
-            where, f'lacks {DIAMETER}, and the film does not show this tray', 'add it'
+            _place(film, key, name),
+            f'lacks {DIAMETER}, and the film does not show this tray',
+            'add it',
         )
-    if len(tray.species) > 1:
-        # Edges tell sizes, but not of which species.
-        raise ConfigurationError(
-            where, 'its diameter cannot be found beside that of another species', _REMEDY
-        )
-
-
-def _of_radii(radii: Sequence[NDArray[np.float64]]) -> FoundDiameter | str:
-    """The diameter by the radii in each frame, [px]; or why there is none."""
-    every = np.concatenate(radii)
-    if every.size < _LEAST_DISCS:
-        return f'{counted(every.size, "disc")} in {counted(len(radii), "frame")}'
-    low, middle, high = (2.0 * value for value in np.quantile(every, [0.16, 0.5, 0.84]).tolist())
-    spread = 0.5 * (high - low) / middle
-    if spread > _MAX_SPREAD:
-        return f'no discs of one size stand out ({low:.0f} to {high:.0f} px)'
-    return FoundDiameter(middle, spread, every.size, len(radii))

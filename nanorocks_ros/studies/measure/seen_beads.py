@@ -90,17 +90,12 @@ def seen_beads(text: str, frames: Sequence[NDArray[np.uint8]]) -> SeenBeads:
     (tray,) = load_trays(text).values()
     section = film_section(text)
     assert section is not None
-    column, row, width, height = section.region_px
-    crops = [
-        np.ascontiguousarray(frame[row : row + height, column : column + width])
-        for frame in frames
-    ]
+    crops = [section.crop(frame) for frame in frames]
     detector = SceneDetector(tray, section.pixels_per_metre)
     detector.learn(crops)
-    corner = np.array([column, row])
     discs = [
         tuple(
-            np.column_stack([beads.positions + corner, beads.radii])
+            section.film_discs(np.column_stack([beads.positions, beads.radii]))
             for beads in detector.detect(crop)
         )
         for crop in crops
@@ -108,7 +103,8 @@ def seen_beads(text: str, frames: Sequence[NDArray[np.uint8]]) -> SeenBeads:
     shown = frames[len(frames) // 2].copy()
     for species, beads in enumerate(discs[len(frames) // 2]):
         _draw(shown, beads[:, :2], beads[:, 2], species)
-    cv2.rectangle(shown, (column, row), (column + width, row + height), _REGION, 2)
+    corners = np.rint(section.outline_px).astype(np.int32)
+    cv2.polylines(shown, [corners], isClosed=True, color=_REGION, thickness=2)
     table = np.array([[len(beads) for beads in frame] for frame in discs])
     counts = np.median(table, axis=0)
     steady = (table == counts).mean(axis=0)

@@ -22,10 +22,18 @@ from nanorocks_ros.studies.measure.film_tray import (
     described_tray,
 )
 from nanorocks_ros.studies.measure.found_diameters import guessed_diameter
+from nanorocks_ros.studies.measure.species_sizes import (
+    FoundDiameter,
+    SpeciesLook,
+    species_sizes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
 
 _MM = 1e-3
 # Of beads whose size is not known yet.
@@ -82,29 +90,59 @@ def sized_beads(filmed: FilmedTray, samples: FilmSamples) -> tuple[FilmedTray, s
     Raises
     ------
     ConfigurationError
-        When no discs of one size stand out, or there are several species.
+        When no discs of one size stand out, or not as many sizes as species that look alike.
     """
-    if len(filmed.beads) > 1:
+    # Of any size, for the region and the looks.
+    nominal = _of_sizes(filmed, [_NOMINAL_PX] * len(filmed.beads))
+    text = described_tray(nominal, samples.size).text
+    section, species = film_section(text), load_trays(text)[1].species
+    assert section is not None
+    crops = [section.crop(frame) for frame in samples.frames]
+    looks = [
+        SpeciesLook(
+            sign=kind.appearance.sign,
+            colour=kind.appearance.colour,
+            diameter=told.diameter_px,
+            order=told.diameter or 0.0,
+        )
+        for kind, told in zip(species, filmed.beads, strict=True)
+        if kind.appearance is not None
+    ]
+    sizes = _guessed_sizes(crops, looks)
+    unknown = [k for k, look in enumerate(looks) if math.isnan(look.diameter)]
+    names = (
+        ['the diameter']
+        if len(looks) == 1
+        else [f'the diameter of {kind.material}' for kind in species]
+    )
+    shown = '; '.join(f'{names[k]} is guessed: {sizes[k]}' for k in unknown)
+    diameters = [
+        round(size.diameter, 2) if math.isnan(look.diameter) else look.diameter
+        for look, size in zip(looks, sizes, strict=True)
+    ]
+    return _of_sizes(filmed, diameters), f'{shown}; --diameter-px sets it'
+
+
+def _guessed_sizes(
+    crops: Sequence[NDArray[np.uint8]], looks: Sequence[SpeciesLook]
+) -> tuple[FoundDiameter, ...]:
+    if len(looks) == 1:
+        return (guessed_diameter(crops, BeadLook(sign=looks[0].sign, colour=looks[0].colour)),)
+    sizes = species_sizes(crops, looks)
+    if isinstance(sizes, str):
         raise ConfigurationError(
             '--diameter-px',
-            f'{AUTO} finds the size of one species',
+            f'cannot be guessed: {sizes}',
             'measure a bead of each, or mark them: nanorocks tray FILM --browse -o mine.yaml',
         )
-    # Of any size, for the region and the look.
-    text = described_tray(_of_size(filmed, _NOMINAL_PX), samples.size).text
-    section, appearance = film_section(text), load_trays(text)[1].species[0].appearance
-    assert section is not None
-    assert appearance is not None
-    column, row, width, height = section.region_px
-    crops = [frame[row : row + height, column : column + width] for frame in samples.frames]
-    size = guessed_diameter(crops, BeadLook(sign=appearance.sign, colour=appearance.colour))
-    return _of_size(filmed, round(size.diameter, 2)), (
-        f'the diameter is guessed: {size}; --diameter-px sets it'
+    return sizes
+
+
+def _of_sizes(filmed: FilmedTray, diameters_px: Sequence[float]) -> FilmedTray:
+    species = zip(filmed.beads, diameters_px, strict=True)
+    return replace(
+        filmed, beads=tuple(replace(beads, diameter_px=size) for beads, size in species)
     )
-
-
-def _of_size(filmed: FilmedTray, diameter_px: float) -> FilmedTray:
-    return replace(filmed, beads=(replace(filmed.beads[0], diameter_px=diameter_px),))
 
 
 def filmed_tray(told: ToldFilm) -> FilmedTray | None:

@@ -79,7 +79,18 @@ def test_a_diameter_in_millimetres_gives_the_scale():
         ({'beads': ()}, 'is needed'),
         (
             {'corners_px': ((60.0, 20.0), (300.0, 20.0), (330.0, 220.0), (30.0, 220.0))},
-            'no upright rectangle: one is 30 px off',
+            'no upright rectangle: one is 30 px off, .*; add --sides-mm',
+        ),
+        (
+            {
+                'corners_px': ((120.0, 20.0), (240.0, 20.0), (330.0, 220.0), (30.0, 220.0)),
+                'sides': (0.06, 0.04),
+            },
+            'scales differ by .* more than 40%',
+        ),
+        (
+            {'corners_px': ((60.0, 20.0), (300.0, 20.0), (200.0, 40.0), (30.0, 220.0))},
+            'do not form a container',
         ),
     ],
 )
@@ -87,6 +98,30 @@ def test_numbers_that_do_not_fit_are_refused(changes, problem):
     values = {'beads': (FilmedBeads(diameter_px=20.0, count=8),), **changes}
     with pytest.raises(ConfigurationError, match=problem):
         described(FilmedTray(**values))
+
+
+def test_corners_in_perspective_are_rectified_to_the_sides():
+    corners = ((330.0, 220.0), (312.0, 25.0), (52.0, 20.0), (34.0, 215.0))
+    beads = (FilmedBeads(diameter_px=20.0, diameter=4e-3),)
+    tray = described(FilmedTray(beads=beads, corners_px=corners, sides=(0.06, 0.04), height=5e-3))
+    section = film_section(tray.text)
+    assert section.corners_px == tuple(corners[k] for k in (2, 1, 0, 3))
+    assert section.picture_px == SIZE
+    column, row, width, height = section.region_px
+    assert (column, row) == (0, 0)
+    assert width / height == pytest.approx(1.5, rel=0.01)
+    assert width / 0.06 == pytest.approx(section.pixels_per_metre, rel=0.01)
+    # As large in pixels as in the film.
+    assert width * height == pytest.approx(54_000, rel=0.03)
+    assert any('seen at an angle, scales differ by' in notice for notice in tray.notices)
+
+
+def test_a_rectangle_that_is_turned_in_the_picture_needs_no_sides():
+    corners = ((100.0, 20.0), (292.0, 76.0), (264.0, 172.0), (72.0, 116.0))
+    tray = described(FilmedTray(beads=(FilmedBeads(diameter_px=20.0),), corners_px=corners))
+    section = film_section(tray.text)
+    assert section.region_px == (0, 0, 200, 100)
+    assert section.perspective.stretch == pytest.approx(1.0, abs=0.01)
 
 
 def test_corners_that_are_clicked_a_little_off_are_taken():

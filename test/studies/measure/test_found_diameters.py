@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from drawn_discs import SIZE, disc_frames
 
+from benchmarks.drawn_scenes import DrawnScene, draw
 from nanorocks_ros.cli.main import main
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.trays import load_trays
@@ -72,6 +73,18 @@ def test_the_size_is_found_with_the_scale_of_the_file_and_said(discs, tmp_path):
     assert f'diameter_mm: {1e3 * species.diameter:.4g} keeps it' in notice
 
 
+def test_sizes_of_species_in_one_film_are_found(tmp_path):
+    scene = DrawnScene(sizes=(7.0, 10.5), count=20, frames=16)
+    bag = bag_of(tmp_path, draw(scene)[0])
+    path = trays_file(tmp_path, 'look: auto, material: small', 'look: auto, material: large')
+    recorded = with_found_diameters(PipelineSettings(trays_file=str(path)), {'trays_file'}, bag)
+    small, large = load_trays(recorded.settings.trays_file)[1].species
+    assert small.diameter == pytest.approx(14.0 / SCALE, rel=0.02)
+    assert large.diameter == pytest.approx(21.0 / SCALE, rel=0.02)
+    for material, notice in zip(('small', 'large'), recorded.notices, strict=True):
+        assert f'the diameter of {material} in tray 1 is found in the film' in notice
+
+
 def test_a_told_scale_counts_where_the_file_has_none(discs, tmp_path):
     path = trays_file(tmp_path, 'look: auto')
     path.write_text(path.read_text().split('\n', 1)[1])
@@ -94,7 +107,9 @@ def test_of_a_file_that_tells_all_sizes_nothing_changes(discs, tmp_path):
 @pytest.mark.parametrize(
     ('species', 'problem'),
     [
-        (('look: auto', 'look: auto, diameter_mm: 2'), r'another species; measure a bead'),
+        (('look: auto', 'look: auto'), r'2 of one look .* of \d\d\.\d px; measure a bead'),
+        (('look: auto', 'colour: red'), r'colour of some species is told'),
+        (('look: auto, diameter_mm: 5', 'look: auto'), r'2 of one look'),
         (('look: bright',), r'nanorocks tray FILM --browse'),
     ],
 )

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
     from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours
 
+# Brightness of a shaded bead over that of its colour in even light.
+_DARKEST, _BRIGHTEST = 0.4, 1.35
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeadLook:
@@ -86,6 +89,15 @@ def join_candidates(parts: Sequence[Candidates]) -> tuple[Candidates, NDArray[np
         *(np.concatenate([part[k] for part in parts]) for k in range(1, 6)),
     )
     return joined, np.repeat(np.arange(len(parts)), [len(part.moving) for part in parts])
+
+
+def shaded_distances(
+    colours: NDArray[np.float64], told: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Distance of colours (n, 3) from one that is told, in light or shade, (n,), [gray levels]."""
+    colour = np.array(told)
+    shade = np.clip(colours @ colour / (colour @ colour), _DARKEST, _BRIGHTEST)
+    return np.asarray(np.linalg.norm(colours - shade[:, None] * colour, axis=1))
 
 
 class View(NamedTuple):

@@ -13,7 +13,7 @@ import numpy as np
 
 from nanorocks_ros.stages.tracking.scene.disc_measures import apart
 from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, find_centres
-from nanorocks_ros.stages.tracking.scene.outline_fits import fit_outlines
+from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _SMALLEST_PX, _LARGEST_SHARE, _RADIUS_RATIO = 2.5, 0.25, 1.3
 _RADIUS_TOLERANCE = 0.2
 # Smallest share of an outline that votes for a centre, and that the edges on the circle cover.
-_LEAST_VOTES, _LEAST_SUPPORT = 0.5, 0.7
+_LEAST_VOTES, LEAST_SUPPORT = 0.5, 0.7
 
 
 def usual_step(picture: NDArray[np.uint8], noise: float) -> float:
@@ -35,18 +35,28 @@ def usual_step(picture: NDArray[np.uint8], noise: float) -> float:
     return max(3.0 * float(np.quantile(edges, 0.8)) if edges.size else 0.0, 4.0 * noise, 4.0)
 
 
+def trial_ranges(shape: tuple[int, ...]) -> list[tuple[float, float]]:
+    """Smallest and largest radius of each search where nothing is known of the size, [px]."""
+    largest = _LARGEST_SHARE * min(shape)
+    count = max(1, math.ceil(math.log(largest / _SMALLEST_PX) / math.log(_RADIUS_RATIO)))
+    middles = [_SMALLEST_PX * _RADIUS_RATIO ** (k + 0.5) for k in range(count)]
+    ratio = math.sqrt(_RADIUS_RATIO)
+    return [(middle / ratio, middle * ratio) for middle in middles]
+
+
+def outlines_in(picture: NDArray[np.uint8], voting: Voting) -> Outlines:
+    """Discs with most of an outline in a picture."""
+    centres = find_centres(picture, voting, _LEAST_VOTES)
+    outlines = fit_outlines(picture, centres[:, :3], voting)
+    return outlines.chosen(outlines.support >= LEAST_SUPPORT)
+
+
 def search_radii(picture: NDArray[np.uint8], start: Voting) -> Voting:
     """With smallest and largest radius of the discs that cover most of the outlines."""
     largest = _LARGEST_SHARE * min(picture.shape)
-    count = max(1, math.ceil(math.log(largest / _SMALLEST_PX) / math.log(_RADIUS_RATIO)))
     best, chosen = 0.0, start._replace(smallest=_SMALLEST_PX, largest=largest)
-    for k in range(count):
-        middle = _SMALLEST_PX * _RADIUS_RATIO ** (k + 0.5)
-        ratio = math.sqrt(_RADIUS_RATIO)
-        voting = start._replace(smallest=middle / ratio, largest=middle * ratio)
-        centres = find_centres(picture, voting, _LEAST_VOTES)
-        outlines = fit_outlines(picture, centres[:, :3], voting)
-        outlines = outlines.chosen(outlines.support >= _LEAST_SUPPORT)
+    for low, high in trial_ranges(picture.shape):
+        outlines = outlines_in(picture, start._replace(smallest=low, largest=high))
         outlines = outlines.chosen(apart(outlines))
         evidence = float((outlines.support**2 * outlines.discs[:, 2] * outlines.steps).sum())
         if evidence > best:

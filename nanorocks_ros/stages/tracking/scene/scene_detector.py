@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
@@ -10,15 +12,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
-from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook, shaded_distances
 from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel, scene_model
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Species, Tray
+    from nanorocks_ros.stages.tracking.scene.bead_looks import Candidates
 
 # Frames kept to learn from, spread over the film; the look is learnt again whenever the number
 # of frames has grown by the factor.
@@ -28,8 +31,6 @@ _GROWTH = 3
 _RADIUS_TOLERANCE = 1.2
 # The background follows the light by one level in so many frames.
 _FOLLOWING_FRAMES = 5
-# Brightness of a shaded bead over that of its colour in even light.
-_DARKEST, _BRIGHTEST = 0.4, 1.35
 # Systematic error of a position: light and shadow on the outline, [px].
 _LEAST_ERROR_PX = 0.03
 # In a layer, up to this height over the diameter, beads are so many radii apart in the picture.
@@ -51,6 +52,13 @@ class _RankedDiscs(NamedTuple):
         return _RankedDiscs(*(values[rows] for values in self))
 
 
+class _Alike(NamedTuple):
+    """Species that look alike, as one: limits of the radii of each, [px], by its number."""
+
+    look: BeadLook
+    limits: dict[int, tuple[float, float]]
+
+
 class SceneDetector:
     """Finds the beads of one tray by what the film shows.
 
@@ -68,6 +76,7 @@ class SceneDetector:
         self._tray = tray
         self._scale = pixels_per_metre
         self._looks = [_look(tray, species, pixels_per_metre) for species in tray.species]
+        self._groups = _alike(self._looks)
         self._models: list[SceneModel] = []
         self._kept: list[NDArray[np.uint8]] = []
         self._every = 1
@@ -82,7 +91,7 @@ class SceneDetector:
         ----------
         frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
         """
-        self._models = [scene_model(frames, look) for look in self._looks]
+        self._models = [scene_model(frames, group.look) for group in self._groups]
         # Nothing is to be learnt any more.
         self._learnt_at = -1
 
@@ -99,14 +108,24 @@ class SceneDetector:
         """
         color = np.ascontiguousarray(color)
         self._learn_on(color)
-        of_species = []
-        for k, model in enumerate(self._models):
-            known = hints[k][:, :3] - [0.5, 0.5, 0.0] if len(hints) else None
-            of_species.append(self._of_species(k, model, color, known))
+        of_species: dict[int, _RankedDiscs] = {}
+        for group, model in zip(self._groups, self._models, strict=True):
+            known = None
+            if len(hints):
+                known = np.concatenate([hints[k][:, :3] for k in group.limits])
+                known = known - [0.5, 0.5, 0.0]
+            candidates = model.candidates(color, known)
+            alike = model.alike(candidates)
+            alike &= self._is_allowed(candidates.outlines.discs, color.shape)
+            for k, limits in group.limits.items():
+                of_species[k] = self._of_species(k, candidates, alike, limits)
             if self._frames % _FOLLOWING_FRAMES == 0:
                 model.colours.follow(color)
         self._frames += 1
-        return tuple(_detections(rows) for rows in self._best_of_species(of_species))
+        return tuple(
+            _detections(rows)
+            for rows in self._best_of_species([of_species[k] for k in range(len(of_species))])
+        )
 
     def _learn_on(self, color: NDArray[np.uint8]) -> None:
         """Keep frames spread over the film so far, and learn from them again as it grows."""
@@ -120,24 +139,24 @@ class SceneDetector:
                 del self._kept[1::2]
                 self._every *= 2
         if self._frames >= _GROWTH * self._learnt_at or not self._models:
-            self._models = [scene_model(self._kept, look) for look in self._looks]
+            self._models = [scene_model(self._kept, group.look) for group in self._groups]
             self._learnt_at = max(self._frames, 1)
 
     def _of_species(
         self,
         k: int,
-        model: SceneModel,
-        color: NDArray[np.uint8],
-        hints: NDArray[np.float64] | None,
+        candidates: Candidates,
+        alike: NDArray[np.bool_],
+        limits: tuple[float, float],
     ) -> _RankedDiscs:
-        """Discs that look like beads of a species, the best first."""
-        candidates = model.candidates(color, hints)
+        """Discs that look like beads of a species, of radii within its limits; the best first."""
         outlines = candidates.outlines
         distances = self._colour_distances(candidates.colours)
         # Nearer to the colour that is told than what is around it.
         nearer = distances[:, k] <= self._colour_distances(candidates.around)[:, k]
-        alike = model.alike(candidates) & nearer & (np.argmin(distances, axis=1) == k)
-        alike &= self._is_allowed(outlines.discs, color.shape)
+        # Equal where colours are not told.
+        alike = alike & nearer & (distances[:, k] <= distances.min(axis=1))
+        alike &= (outlines.discs[:, 2] >= limits[0]) & (outlines.discs[:, 2] < limits[1])
         # Where the film is not known to its end, they may move yet.
         aside = candidates.aside & (self._learnt_at < 0)
         if self._tray.species[k].expected is None:
@@ -157,9 +176,7 @@ class SceneDetector:
         distances = np.zeros((len(colours), len(self._looks)))
         for k, look in enumerate(self._looks):
             if look.colour is not None:
-                told = np.array(look.colour)
-                shade = np.clip(colours @ told / (told @ told), _DARKEST, _BRIGHTEST)
-                distances[:, k] = np.linalg.norm(colours - shade[:, None] * told, axis=1)
+                distances[:, k] = shaded_distances(colours, look.colour)
         return distances
 
     def _is_allowed(self, discs: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -214,6 +231,51 @@ def _look(tray: Tray, species: Species, pixels_per_metre: float) -> BeadLook:
         apart=_LAYER_APART if not tray.dimensions[2] > _LAYER * species.diameter_high else 1.0,
         colour=species.properties.color if appearance is None else appearance.colour,
     )
+
+
+def _alike(looks: Sequence[BeadLook]) -> list[_Alike]:
+    """The species in groups that look alike, each with the limits of its radii.
+
+    A limit lies half way between two sizes. Of species whose sizes overlap the first has all
+    discs: nothing that shows tells them apart.
+    """
+    groups = []
+    for key in dict.fromkeys((look.sign, look.colour) for look in looks):
+        members = [k for k, look in enumerate(looks) if (look.sign, look.colour) == key]
+        joined = replace(
+            looks[members[0]],
+            radii=(
+                min(looks[k].radii[0] for k in members),
+                max(looks[k].radii[1] for k in members),
+            ),
+            apart=min(looks[k].apart for k in members),
+        )
+        groups.append(_Alike(joined, _limits({k: looks[k].radii for k in members})))
+    return groups
+
+
+def _limits(radii: Mapping[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
+    """Smallest and largest radius of the discs of each species, by what is told of these."""
+    # As told: without the tolerance.
+    told = {
+        k: (low * _RADIUS_TOLERANCE, high / _RADIUS_TOLERANCE) for k, (low, high) in radii.items()
+    }
+    # Largest radius of species whose sizes overlap, and these.
+    sizes: list[tuple[float, list[int]]] = []
+    edges = [0.0]
+    for k in sorted(told, key=lambda k: told[k]):
+        low, high = told[k]
+        if sizes and not low > sizes[-1][0] * (1.0 + 1e-9):
+            largest, members = sizes.pop()
+            sizes.append((max(largest, high), [*members, k]))
+            continue
+        if sizes:
+            edges.append(math.sqrt(sizes[-1][0] * low))
+        sizes.append((high, [k]))
+    limits = dict.fromkeys(told, (math.inf, math.inf))
+    for (_, members), between in zip(sizes, pairwise([*edges, math.inf]), strict=True):
+        limits[min(members)] = between
+    return limits
 
 
 def _detections(found: _RankedDiscs) -> Detections:

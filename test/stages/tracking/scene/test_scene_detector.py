@@ -110,3 +110,24 @@ def test_a_gray_camera_is_enough(film):
         tracks = tracker.push(image)[0]
     assert tracks.seen.sum() == SCENE.count
     assert distances(SCALE * tracks.positions[tracks.seen], truth[-1]).max() < 0.5
+
+
+def test_species_that_look_alike_are_told_apart_by_their_size():
+    scene = replace(SCENE, sizes=(7.0, 9.0), seed=5)
+    frames, truth = draw(scene)
+    # The larger one first: the order tells nothing.
+    large, small = detected(
+        tray_of(['diameter_mm: 18, look: auto', 'diameter_mm: 14, look: auto']), frames
+    )
+    assert len(large.radii) + len(small.radii) == scene.count
+    for beads, radius in ((large, 9.0), (small, 7.0)):
+        of_size = truth[0][truth[0][:, 2] == radius]
+        assert len(beads.radii) == len(of_size)
+        assert distances(beads.positions, of_size).max() < 0.5
+
+
+def test_of_species_with_one_look_and_one_size_the_first_has_all(film):
+    frames, _ = film
+    kind = 'diameter_mm: 18, look: auto'
+    first, second = detected(tray_of([kind, kind]), frames)
+    assert (len(first.radii), len(second.radii)) == (SCENE.count, 0)
