@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.own_tray import SCALE, SIZE, TRAY
 from nanorocks_ros.cli.main import main
-from nanorocks_ros.experiment.perspective import Perspective
+from nanorocks_ros.experiment.oblique_view import Perspective
 from nanorocks_ros.studies.measure import film_tray
 
 # How much shorter the far side is than the near one.
