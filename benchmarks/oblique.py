@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 from benchmarks.drawn_scenes import SCENES, draw
 from benchmarks.own_tray import SCALE, SIZE, TRAY
 from nanorocks_ros.cli.main import main
-from nanorocks_ros.experiment.perspective import Perspective
+from nanorocks_ros.experiment.oblique_view import Perspective
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 from nanorocks_ros.studies.measure import film_tray

@@ -13,7 +13,7 @@ import yaml
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.calibration import Calibration, rectified_view
 from nanorocks_ros.experiment.calibration_file import calibration_text
-from nanorocks_ros.experiment.perspective import Perspective, clockwise
+from nanorocks_ros.experiment.oblique_view import Perspective, clockwise
 from nanorocks_ros.experiment.plate import Region
 from nanorocks_ros.experiment.trays import FILM_SECTION
 from nanorocks_ros.experiment.yaml_lines import YamlLines, file_content, parse_yaml, shown_name

@@ -15,7 +15,7 @@ import numpy as np
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.appearance import AUTO, COLOUR_FORMS, LOOKS, is_colour
 from nanorocks_ros.experiment.film_section import FilmSection
-from nanorocks_ros.experiment.perspective import MAX_STRETCH, Perspective, clockwise
+from nanorocks_ros.experiment.oblique_view import MAX_STRETCH, Perspective, clockwise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

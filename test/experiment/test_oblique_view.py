@@ -8,7 +8,7 @@ import pytest
 
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.experiment.calibration import rectified_view
-from nanorocks_ros.experiment.perspective import Perspective, clockwise
+from nanorocks_ros.experiment.oblique_view import Perspective, clockwise
 
 CORNERS = ((60.0, 20.0), (300.0, 24.0), (330.0, 220.0), (34.0, 215.0))
 SEEN = Perspective(CORNERS, (280, 190))
