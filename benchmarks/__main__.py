@@ -40,6 +40,7 @@ ALL = (
     'contacts_alone',
     'short_films',
     'own_tray',
+    'oblique',
     'python_interface',
     'radii',
     'found_sizes',

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import json
 
 import cv2
+import numpy as np
 import pytest
 from drawn_discs import SIZE, disc_frames
 
@@ -72,6 +74,34 @@ def test_a_number_that_few_frames_show_is_left_open(tmp_path, capsys):
     printed = capsys.readouterr()
     assert 'the number of beads is left open' in printed.err
     assert load_trays(output)[1].species[0].expected is None
+
+
+def test_a_film_from_aside_is_rectified_by_its_corners(tmp_path, capsys):
+    folder, output, table = tmp_path / 'discs', tmp_path / 'mine.yaml', tmp_path / 'tracks.csv'
+    folder.mkdir()
+    corners = np.array([(26.0, 18.0), (330.0, 12.0), (345.0, 230.0), (14.0, 226.0)])
+    width, height = SIZE
+    whole = np.float32([(0, 0), (width, 0), (width, height), (0, height)])
+    tilt = cv2.getPerspectiveTransform(whole - 0.5, np.float32(corners) - 0.5)
+    for number, frame in enumerate(disc_frames([DARK], count=10)):
+        tilted = cv2.warpPerspective(frame, tilt, SIZE, borderValue=(170, 170, 170))
+        cv2.imwrite(str(folder / f'{number:02d}.png'), tilted)
+    bag = str(tmp_path / 'bag')
+    assert main(['import', str(folder), '--rate', '30', '-o', bag]) == 0
+    told = ['--corners', *(f'{value:g}' for value in corners.ravel())]
+    told += ['--sides-mm', f'{width / 10}', f'{height / 10}', '--diameter-px', '20']
+    assert main(['tray', bag, *told, '--diameter-mm', '2', '-o', str(output)]) == 0
+    assert 'seen at an angle' in capsys.readouterr().err
+    assert main(['track', bag, '--trays-file', str(output), '-o', str(table)]) == 0
+    with table.open() as stream:
+        rows = [row for row in csv.DictReader(stream) if row['frame'] == '0']
+    places = np.array([(float(row['x']), float(row['y'])) for row in rows])
+    drawn = np.array([(40 + 50 * (k % 6), 45 + 55 * (k // 6)) for k in range(10)]) * 1e-4
+    away = np.hypot(*(drawn[:, None] - places[None]).transpose(2, 0, 1))
+    assert len(rows) == 10
+    assert away.min(axis=1).max() < 5e-5
+    radii = np.array([float(row['radius']) for row in rows])
+    assert radii == pytest.approx(1e-3, rel=0.06)
 
 
 def test_an_existing_file_is_not_overwritten(film, tmp_path, capsys):
