@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -100,6 +101,16 @@ def test_radii_measured_too_large_do_not_bias_the_restitution():
     doubted = _pairs(collisions)
     assert abs(doubted.restitution - 0.8) < 3.0 * doubted.restitution_error
     assert abs(doubted.restitution - 0.8) < 0.5 * abs(believed.restitution - 0.8)
+
+
+def test_distances_tell_that_known_radii_show_larger():
+    exact = drawn_collisions(9, 60, 0.8)
+    larger = [replace(collision, radii=1.0075 * collision.radii) for collision in exact]
+    believed = _pairs(larger, excesses=(RadiusExcess(0.0, 0.0),))
+    told, true = _pairs(larger), _pairs(exact)
+    assert told.restitution == pytest.approx(true.restitution, abs=0.2 * true.restitution_error)
+    assert told.restitution_error < 1.05 * true.restitution_error
+    assert believed.restitution_error > 1.1 * true.restitution_error
 
 
 def test_missing_collisions_below_the_sticking_speed_do_not_bias_the_restitution():
