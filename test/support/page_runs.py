@@ -12,7 +12,7 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
-from page_code import ROOT, blocks
+from page_code import ROOT, blocks, calls
 
 from nanorocks_ros.cli.main import main
 
@@ -112,7 +112,7 @@ def run_page(text, folder):
         elif block.language == 'python':
             output, runs = _run_python(block.text, names, folder), runs + 1
         elif block.language in ('', 'bash'):
-            output, runs = run_shell(block.text, folder), runs + 1
+            output, runs = run_here(' && '.join(calls(block.text)), folder), runs + 1
     return wrong, runs
 
 
