@@ -10,7 +10,7 @@ from functools import cache
 
 import pytest
 from page_code import PAGES, ROOT
-from page_runs import not_printed, printed_blocks, run_shell
+from page_runs import not_printed, printed_blocks, run_here
 
 PRINTED = [
     pytest.param(command, block, id=f'{page.relative_to(ROOT)}-{number}')
@@ -27,7 +27,7 @@ def printed(tmp_path_factory):
     def output(command):
         folder = tmp_path_factory.mktemp('printed')
         (folder / 'bags').symlink_to(ROOT / 'bags')
-        return run_shell(command, folder)
+        return run_here(command, folder)
 
     return output
 

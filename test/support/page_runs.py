@@ -6,12 +6,15 @@ import contextlib
 import io
 import os
 import re
+import shlex
 import subprocess
 import sys
 from fractions import Fraction
 from pathlib import Path
 
-from page_code import ROOT, blocks
+from page_code import ROOT, blocks, calls
+
+from nanorocks_ros.cli.main import main
 
 PATIENCE_S = 300
 NUMBER = re.compile(r'[-+]?\d+(?:\.(\d+))?')
@@ -38,6 +41,28 @@ def run_shell(command, folder):
     )
     assert finished.returncode == 0, f'{command}{finished.stdout}'
     return finished.stdout
+
+
+def run_here(command, folder):
+    """What commands joined by ``&&`` print; those of this package without a new process."""
+    return ''.join(
+        _run_main(words[1:], folder) if words[0] == 'nanorocks' else run_shell(part, folder)
+        for part in command.split(' && ')
+        for words in [shlex.split(part)]
+    )
+
+
+def _run_main(arguments, folder):
+    """Standard output and error of the command `nanorocks`, which has to end with code 0."""
+    said = io.StringIO()
+    with (
+        _inside(folder),
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(said),
+    ):
+        code = main(arguments)
+    assert code == 0, f'{arguments}{said.getvalue()}'
+    return said.getvalue()
 
 
 def same_word(printed, stated):
@@ -87,20 +112,27 @@ def run_page(text, folder):
         elif block.language == 'python':
             output, runs = _run_python(block.text, names, folder), runs + 1
         elif block.language in ('', 'bash'):
-            output, runs = run_shell(block.text, folder), runs + 1
+            output, runs = run_here(' && '.join(calls(block.text)), folder), runs + 1
     return wrong, runs
 
 
 def _run_python(code, names, folder):
     """What a block of Python prints, run in a folder with the names of the blocks before it."""
-    said, before = io.StringIO(), Path.cwd()
+    said = io.StringIO()
+    with _inside(folder), contextlib.redirect_stdout(said):
+        exec(code, names)
+    return said.getvalue()
+
+
+@contextlib.contextmanager
+def _inside(folder):
+    """The folder as the current one; ``contextlib.chdir`` came with Python 3.11."""
+    before = Path.cwd()
     os.chdir(folder)
     try:
-        with contextlib.redirect_stdout(said):
-            exec(code, names)
+        yield
     finally:
         os.chdir(before)
-    return said.getvalue()
 
 
 def printed_blocks(text):

@@ -49,6 +49,6 @@ def test_errors_are_as_stated_in_a_film_of_a_drawn_camera(tmp_path):
     values = {'tray': 1, 'seed': 11, 'mean_speed': 0.008, 'first_shake': 1.0}
     simulation = with_values(SimulationSettings(), values, 'test')
     stem = tmp_path / 'drawn'
-    write_drawn_film(stem, load_trays()[1], simulation, 8.0, 34, moving=0.0)
+    write_drawn_film(stem, load_trays()[1], simulation, 4.0, 34, moving=0.0)
     (video,) = [path for path in tmp_path.glob('drawn.*') if path.suffix in ('.mp4', '.avi')]
     assert within(place_ratios(video), FACTOR)
