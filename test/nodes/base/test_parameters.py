@@ -10,6 +10,8 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter
 
+from nanorocks_ros.nodes.base.compile_progress import COMPILING
+
 SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
 
 
@@ -27,11 +29,6 @@ SPEED = 'qos_overrides./nanorocks/tray_1/speed.subscription'
         ('bag_player', 'rate:=1.0', 'parameter bag: is empty; give the path of a bag'),
         ('bag_player', 'bag:=2015', """2015 is not a string; quote it twice: -p "bag:='2015'\""""),
         ('haff_fitter', f'{SPEED}.reliability:=best_efort', "'best_efort' is not one of system"),
-        (
-            'haff_fitter',
-            f'{SPEED.replace("speed", "sped")}.depth:=3',
-            '(did you mean /nanorocks/tray_1/speed',
-        ),
         ('simulator', 'nois:=1.0', "no parameter 'nois' (did you mean noise"),
     ],
 )
@@ -41,6 +38,16 @@ def test_a_bad_parameter_ends_the_node_with_one_line(graph, name, parameter, mes
     assert message in finished.output
     # Not even on a machine that has compiled nothing yet anything is compiled before.
     assert len(finished.output.splitlines()) == 1, finished.output
+
+
+def test_an_override_of_an_unknown_topic_ends_the_node_with_one_line(graph):
+    parameter = f'{SPEED.replace("speed", "sped")}.depth:=3'
+    finished = graph.wait(graph.start('haff_fitter', parameter))
+    assert finished.code == 2
+    # A node subscribes once it has compiled, and knows its topics then.
+    lines = [line for line in finished.output.splitlines() if COMPILING not in line]
+    assert len(lines) == 1, finished.output
+    assert '(did you mean /nanorocks/tray_1/speed' in lines[0]
 
 
 def set_parameter(graph, node, name, value):
