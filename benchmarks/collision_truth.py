@@ -20,8 +20,8 @@ import numpy as np
 from benchmarks.drawn_films import measured
 from benchmarks.foreign_world import films_drawn
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.contacts.contact_likelihood import EXCESSES, VERTICAL_RATIOS
-from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.contacts.contact_likelihood import EXCESSES
+from nanorocks_ros.inference.contacts.contact_terms import BEADS, ContactTerms
 from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.records import NS, PairCollision
 
@@ -132,7 +132,7 @@ def _excesses(matches: list[_Match]) -> tuple[float, float, float] | None:
         return None
     true = float(np.median([match.excess for match in alike]))
     table = ContactTerms.of(match.seen for match in alike).beads
-    by_excess = np.moveaxis(table.reshape(len(VERTICAL_RATIOS), len(EXCESSES), -1), 1, 0)
+    by_excess = np.moveaxis(table.reshape(-1, len(EXCESSES), BEADS.size), 1, 0)
     logs = np.array([float(log_sum(rows.reshape(-1, 1))[0]) for rows in by_excess])
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()

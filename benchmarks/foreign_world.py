@@ -33,6 +33,8 @@ DRAWN = 'NANOROCKS_DRAWN_FILMS'
 """Environment variable with trays and numbers of the drawn films."""
 _TRAYS = (1, 3, 5, 7)
 _HALF_WIDTHS = 3.0
+# Half of an interval of 95 % in standard deviations.
+_SIGMAS = 1.96
 # Factor within which stated errors count as right.
 _FACTOR = 1.5
 
@@ -76,6 +78,8 @@ def print_drawn(read: list[ReadFilm]) -> None:
     """Print what is measured in drawn films, tray by tray."""
     print('\nDrawn films: restitutions of the unflagged final estimates\n')
     print_restitutions(read)
+    print('\nDrawn films: restitution of beads by contacts alone, in flagged films, too\n')
+    print_contacts(read)
     print('\nDrawn films: measured over true; speeds by true mean projected speed in mm/s\n')
     groups = ' | '.join(f'{1e3 * low:g} to {1e3 * high:g}' for low, high in pairwise(DECADES))
     print(f'| tray | {groups} | speeds flagged | beads counted, by species | radii, by species |')
@@ -100,6 +104,38 @@ def print_restitutions(read: list[ReadFilm]) -> None:
     print('| --- ' * 12 + '|')
     for tray, films in _by_tray(read).items():
         print(_restitution_row(tray, films))
+
+
+def print_contacts(read: list[ReadFilm]) -> None:
+    """Print errors of what collisions say over the stated ones, tray by tray and of all."""
+    print(
+        '| tray | films | collisions | mean error over stated | root mean square | weighted bias |'
+    )
+    print('| --- ' * 6 + '|')
+    by_tray = {str(tray): films for tray, films in _by_tray(read).items()}
+    for name, films in [*by_tray.items(), ('all', read)]:
+        print(_contact_row(name, films))
+
+
+def _contact_row(name: str, films: list[ReadFilm]) -> str:
+    collisions, errors, stated = 0, [], []
+    for read_film in films:
+        if len(read_film.result.cycles) != 1:
+            continue
+        cycle = read_film.result.cycles[0]
+        value, lower, upper = _limits(cycle.contact_restitution)
+        if cycle.collisions and upper > lower and math.isfinite(read_film.film.beads):
+            collisions += cycle.collisions
+            errors.append(value - read_film.film.beads)
+            stated.append(0.5 * (upper - lower) / _SIGMAS)
+    if not errors:
+        return f'| {name} | 0 ' + '| ' * 4 + '|'
+    ratios, weights = np.divide(errors, stated), np.power(stated, -2.0)
+    return (
+        f'| {name} | {len(errors)} | {collisions} | {ratios.mean():+.2f} '
+        f'| {math.sqrt(np.mean(ratios**2)):.2f} '
+        f'| {np.average(errors, weights=weights):+.4f} ± {weights.sum() ** -0.5:.4f} |'
+    )
 
 
 def _by_tray(read: list[ReadFilm]) -> dict[int, list[ReadFilm]]:

@@ -69,6 +69,9 @@ class Deviation:
         Factor on all lengths in the picture.
     tilt : float, [rad]
         Of the axis of the camera, towards the length of the tray.
+    camera_height, aside : float, [m]
+        Of the camera above half the height of the tray, where the scale is as told, and from its
+        middle along its length.
     """
 
     name: str
@@ -81,6 +84,8 @@ class Deviation:
     acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
     scale: float = 1.0
     tilt: float = 0.0
+    camera_height: float = math.inf
+    aside: float = 0.0
 
 
 def _rubbing(friction: float) -> dict[str, float]:
@@ -109,6 +114,9 @@ DEVIATIONS = (
     Deviation(name='acceleration 1 mm/s² along the view', acceleration=(0.0, 0.0, 1e-3)),
     Deviation(name='camera tilted by 2°', tilt=math.radians(2.0)),
     Deviation(name='image scale +1 %', scale=1.01),
+    Deviation(name='camera at 0.2 m', camera_height=0.2),
+    Deviation(name='camera at 0.2 m, 40 mm aside', camera_height=0.2, aside=0.04),
+    Deviation(name='camera at 0.12 m, 40 mm aside', camera_height=0.12, aside=0.04),
 )
 
 
@@ -138,7 +146,7 @@ def _true_species(told: Species, deviation: Deviation) -> Species:
 
 
 class SeenTray:
-    """A tray as a camera sees it from far above whose scale or direction is not as told.
+    """A tray as a camera sees it whose scale, direction or distance is not as told.
 
     Parameters
     ----------
@@ -154,6 +162,8 @@ class SeenTray:
         self._middle = 0.5 * np.array(tray.dimensions)
         cosine, sine = math.cos(deviation.tilt), math.sin(deviation.tilt)
         self._scale = deviation.scale
+        self._axis = self._middle[:2] + np.array([deviation.aside, 0.0])
+        self._camera_height = deviation.camera_height
         # To columns and rows of the picture, and depth.
         self._view = deviation.scale * np.array(
             [[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]
@@ -167,11 +177,22 @@ class SeenTray:
     def moments(self, frames: int) -> Iterator[Moment]:
         """Iterate over the frames; to be called once."""
         for moment in self._beads.moments(frames):
-            yield replace(
-                moment,
-                positions=self._middle + (moment.positions - self._middle) @ self._view,
-                velocities=moment.velocities @ self._view,
-            )
+            positions = self._middle + (moment.positions - self._middle) @ self._view
+            places, motion = self._projected(positions, moment.velocities @ self._view)
+            yield replace(moment, positions=places, velocities=motion)
+
+    def _projected(
+        self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Places at half the height of the tray that look the same, and their velocities."""
+        aside = positions[:, :2] - self._axis
+        nearer = positions[:, 2:] - self._middle[2]
+        larger = 1.0 / (1.0 - nearer / self._camera_height)
+        places, motion = positions.copy(), velocities.copy()
+        places[:, :2] = self._axis + larger * aside
+        rise = larger * velocities[:, 2:] / self._camera_height
+        motion[:, :2] = larger * (velocities[:, :2] + rise * aside)
+        return places, motion
 
 
 def tracks_of_cycle(told: Tray, deviation: Deviation, run: int) -> list[Tracks]:

@@ -119,20 +119,23 @@ class CycleLikelihoods:
                 (float(friction), _decay_from(arrays, f'rough_{number}'))
                 for number, friction in enumerate(arrays['frictions'])
             )
+            # Another version may have compared other nuisances.
+            none = ContactTerms.of(())
+            contacts = ContactTerms(
+                rebounds=int(arrays['contacts.rebounds']),
+                collisions=int(arrays['contacts.collisions']),
+                walls=arrays['contacts.walls'].reshape(none.walls.shape),
+                beads=arrays['contacts.beads'].reshape(none.beads.shape),
+                friction=arrays['contacts.friction'].reshape(none.friction.shape),
+                rebound_losses=arrays['contacts.rebound_losses'],
+                collision_losses=arrays['contacts.collision_losses'],
+                rebound_impacts=arrays['contacts.rebound_impacts'],
+                collision_impacts=arrays['contacts.collision_impacts'],
+            )
             return cls(
                 cycles=cycles,
                 decay=replace(_decay_from(arrays, 'decay'), rough=rough),
-                contacts=ContactTerms(
-                    rebounds=int(arrays['contacts.rebounds']),
-                    collisions=int(arrays['contacts.collisions']),
-                    walls=arrays['contacts.walls'],
-                    beads=arrays['contacts.beads'],
-                    friction=arrays['contacts.friction'],
-                    rebound_losses=arrays['contacts.rebound_losses'],
-                    collision_losses=arrays['contacts.collision_losses'],
-                    rebound_impacts=arrays['contacts.rebound_impacts'],
-                    collision_impacts=arrays['contacts.collision_impacts'],
-                ),
+                contacts=contacts,
                 flights=arrays['flights'],
                 by_form=by_form,
                 by_contacts=int(arrays['by_contacts']),

@@ -14,6 +14,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_estimate import checked_grid
+from nanorocks_ros.inference.contacts.momentum_balance import balance_log_likelihood
 from nanorocks_ros.inference.contacts.projected_collisions import (
     RANGE,
     ProjectedCollisions,
@@ -51,16 +52,19 @@ glass beads of 12 px besides up to 4 %, and of smaller ones more.
 MIDDLE_EXCESS = EXCESSES[len(EXCESSES) // 2]
 """The excess that is taken where only one is."""
 
-MIDDLE_NUISANCE = len(EXCESSES) * (len(VERTICAL_RATIOS) // 2) + len(EXCESSES) // 2
-"""Row of `pair_table` with the middle ones of both."""
-
 ERROR_SCALES = (1.0, 1.4, 2.0, 2.8)
 """Factors by which the true errors of rebounds may exceed the stated ones. Not below 1: many slow
 rebounds, whose stated errors are too large, would then give the few fast ones too much weight."""
 
-PAIR_ERRORS = 1.25
-"""The same factor for collisions, from the scatter of simulated cycles. It is fixed, since
-collisions cannot separate errors from vertical speeds."""
+PAIR_SCALES = (1.25, 1.75, 2.5)
+"""The same factors for collisions, which tell them by their balance of momentum. Not below 1.25,
+from the scatter of simulated cycles."""
+
+PAIR_ERRORS = PAIR_SCALES[0]
+"""The factor that is taken where only one is."""
+
+MIDDLE_NUISANCE = len(EXCESSES) * (len(VERTICAL_RATIOS) // 2) + len(EXCESSES) // 2
+"""Row of `pair_table` with that factor and the middle ones of the other nuisances."""
 
 _AT_ONCE = 128
 _SQRT_2_PI = math.sqrt(2.0 * math.pi)
@@ -164,7 +168,9 @@ def pair_table(
     sticking_speed: float = 0.0,
     outliers: float = OUTLIERS,
 ) -> NDArray[np.float64]:
-    """Log likelihood of collisions for each restitution, vertical ratio and excess of the radii.
+    """Log likelihood of collisions for each restitution and each value of the nuisances.
+
+    These are, in the order of the rows, factors of the errors, vertical ratios and excesses.
 
     Parameters
     ----------
@@ -189,24 +195,27 @@ def pair_table(
     grid = checked_grid('restitution', restitution)
     _check_share(outliers)
     if not collisions:
-        return np.zeros((len(vertical_ratios) * len(excesses), grid.size))
-    seen = ProjectedCollisions.of(collisions).with_errors(PAIR_ERRORS)
-    # In batches, so that memory does not grow with the number of collisions.
-    parts = [
-        ProjectedCollisions(*(column[k : k + _AT_ONCE] for column in seen))
-        for k in range(0, len(collisions), _AT_ONCE)
-    ]
+        return np.zeros((len(PAIR_SCALES) * len(vertical_ratios) * len(excesses), grid.size))
+    stated = ProjectedCollisions.of(collisions)
     limits = sticking_speed, outliers
     ratios = np.array(vertical_ratios, dtype=np.float64)
     # Without radii that are measured bead by bead their excess has no effect.
-    has_effect = bool(seen.measured.any())
+    has_effect = bool(stated.measured.any())
     needed = [excess if has_effect else excess._replace(measured=0.0) for excess in excesses]
     different = list(dict.fromkeys(needed))
-    by_excess = np.sum(
-        [projected_log_likelihood(part, grid, ratios, different, limits) for part in parts], axis=0
-    )
     rows = [different.index(excess) for excess in needed]
-    return np.asarray(by_excess[:, rows].reshape(-1, grid.size))
+    balance = balance_log_likelihood(collisions, PAIR_SCALES, outliers)
+    by_scale = []
+    for scale, of_balance in zip(PAIR_SCALES, balance, strict=True):
+        seen = stated.with_errors(scale)
+        # In batches, so that memory does not grow with the number of collisions.
+        parts = [
+            ProjectedCollisions(*(column[k : k + _AT_ONCE] for column in seen))
+            for k in range(0, len(collisions), _AT_ONCE)
+        ]
+        logs = [projected_log_likelihood(part, grid, ratios, different, limits) for part in parts]
+        by_scale.append(np.sum(logs, axis=0)[:, rows] + of_balance)
+    return np.asarray(np.reshape(by_scale, (-1, grid.size)))
 
 
 def _check_share(outliers: float) -> None:

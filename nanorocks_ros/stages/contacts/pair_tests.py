@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nanorocks_ros.inference.contacts.momentum_balance import MOST_MISSING
+
 if TYPE_CHECKING:
     from nanorocks_ros.records import PairCollision
 
@@ -47,6 +49,6 @@ def is_isolated_collision(pair: PairCollision) -> bool:
     return bool(
         relative_speeds[1] > _MAX_MERGED_RATIO * relative_speeds[0]
         and approach > MIN_SIGNAL * approach_error
-        and float(momentum_loss @ momentum_loss) < MAX_SIGMAS**2 * momentum_error**2
+        and float(momentum_loss @ momentum_loss) < MOST_MISSING**2 * momentum_error**2
         and abs(slip) < MAX_SIGMAS * slip_error
     )

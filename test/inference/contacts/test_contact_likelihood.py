@@ -13,6 +13,7 @@ from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_estimate import contact_estimate
 from nanorocks_ros.inference.contacts.contact_likelihood import (
     pair_log_likelihood,
+    pair_table,
     rebound_log_likelihood,
 )
 from nanorocks_ros.inference.contacts.projected_collisions import RadiusExcess
@@ -80,13 +81,24 @@ def test_intervals_from_collisions_have_the_stated_coverage():
     assert 0.55 < covered < 0.9
 
 
-def test_log_likelihoods_of_parts_add_up():
-    collisions = drawn_collisions(8, 150, 0.8)
-    values = {'vertical_ratios': (0.5,), 'excesses': (RadiusExcess(0.0, 0.0),)}
-    parts = [
-        pair_log_likelihood(part, PAIRS, **values) for part in (collisions[:70], collisions[70:])
+def test_errors_that_are_stated_too_small_widen_the_interval():
+    collisions = drawn_collisions(12, 60, 0.8)
+    sure = [
+        replace(
+            collision,
+            before_errors=0.5 * collision.before_errors,
+            after_errors=0.5 * collision.after_errors,
+        )
+        for collision in collisions
     ]
-    assert pair_log_likelihood(collisions, PAIRS, **values) == pytest.approx(sum(parts))
+    wide, narrow = (_pairs(some).restitution_error for some in (collisions, sure))
+    assert narrow > 0.8 * wide
+
+
+def test_tables_of_parts_add_up():
+    collisions = drawn_collisions(8, 150, 0.8)
+    parts = [pair_table(part, PAIRS) for part in (collisions[:70], collisions[70:])]
+    assert pair_table(collisions, PAIRS) == pytest.approx(sum(parts))
 
 
 def test_known_vertical_speeds_reduce_the_error():
