@@ -4,12 +4,16 @@ Measured radii over true ones in pictures of the floor as `FilmTruth` says where
 detection alone: without tracks, which average them. A bead above the floor is nearer to a camera
 at a finite height and seen larger; the truth is multiplied by that. Beads that move less than 1 px
 during the exposure are counted. Films are those of ``python -m benchmarks foreign_world``.
+
+Then the same in pictures of one drawn camera, before and after JPEG with colours at full and at
+half resolution, of shaded and of flat beads: what makes radii large.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -19,7 +23,9 @@ from scipy.spatial import cKDTree
 from benchmarks.film_truth import read_truth
 from benchmarks.foreign_world import films_by_other_code, films_drawn
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.settings import TrackingSettings
+from nanorocks_ros.settings import SimulationSettings, TrackingSettings, with_values
+from nanorocks_ros.simulation.plate_scene.drawn_camera import drawn_camera
+from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector
 
 if TYPE_CHECKING:
@@ -28,6 +34,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks.film_truth import FilmTruth
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.settings import SceneSettings
+    from nanorocks_ros.simulation.plate_scene.drawn_camera import DrawnCamera
 
 # Frames in a row at the start, and frames spread over so many seconds after them.
 _FIRST, _SPREAD, _SECONDS = 8, 32, 14.0
@@ -37,6 +46,16 @@ _SLOW_PX, _VISIBLE = 1.0, 0.6
 _NEAR = 0.6
 # Exposure of films that state none, of the time between frames.
 _EXPOSURE = 0.5
+# Camera whose pictures are compressed, the gas in them, and their number.
+_CAMERA, _FRAMES = 4, 60
+_SIMULATION = {'tray': 1, 'mean_speed': 2e-3, 'first_shake': 0.0}
+_QUALITY = 95
+_SAMPLING = cv2.IMWRITE_JPEG_SAMPLING_FACTOR
+_JPEGS: dict[str, list[int] | None] = {
+    'not compressed': None,
+    'JPEG 4:4:4': [_SAMPLING, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444],
+    'JPEG 4:2:0': [_SAMPLING, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420],
+}
 
 
 def report() -> None:
@@ -61,6 +80,45 @@ def report() -> None:
     for group, ratios in groups.items():
         rms = math.sqrt(np.mean(np.square(ratios)))
         print(f'| {group} | {len(ratios)} | {1e2 * np.median(ratios):+.2f} | {1e2 * rms:.2f} |')
+    _print_causes()
+
+
+def _print_causes() -> None:
+    """Print what pictures with compressed colours do to radii."""
+    tray = load_trays()[1]
+    simulation = with_values(SimulationSettings(), _SIMULATION, 'benchmark')
+    camera = drawn_camera(_CAMERA, tray, simulation)
+    print('\n| pictures of tray 1 | shaded beads [px] | flat beads [px] |\n| --- | --- | --- |')
+    errors = [
+        _errors(camera, tray, replace(camera.scene, camera_height=0.0, shading=shading))
+        for shading in (1.0, 0.0)
+    ]
+    for name in errors[0]:
+        print(f'| {name} | {errors[0][name]:+.3f} | {errors[1][name]:+.3f} |', flush=True)
+
+
+def _errors(camera: DrawnCamera, tray: Tray, scene: SceneSettings) -> dict[str, float]:
+    """Median error of radii by how the pictures are compressed, [px]."""
+    film = SceneFilm(camera.simulation, scene, {tray.number: tray})
+    geometry = film.camera.geometry
+    corner, sides = geometry.corner(tray.number), geometry.sides(tray.number)
+    left, top, width, height = (round(float(side)) for side in (*corner, *sides))
+    detectors = {
+        name: BeadDetector(TrackingSettings(), tray, scene.pixels_per_metre) for name in _JPEGS
+    }
+    errors: dict[str, list[float]] = {name: [] for name in _JPEGS}
+    for moment in film.moments(_FRAMES):
+        for name, sampling in _JPEGS.items():
+            image = moment.frame.image
+            if sampling is not None:
+                options = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY, *sampling]
+                jpeg = cv2.imencode('.jpg', image, options)[1]
+                image = np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), dtype=np.uint8)
+            (beads,) = detectors[name].detect(image[top : top + height, left : left + width])
+            seen = beads.radii[beads.visible_outline > _VISIBLE]
+            true = 0.5 * tray.species[0].diameter * scene.pixels_per_metre
+            errors[name] += (seen - true).tolist()
+    return {name: float(np.median(values)) for name, values in errors.items()}
 
 
 def _radii(film: FilmTruth) -> dict[int, tuple[NDArray[np.float64], ...]]:
