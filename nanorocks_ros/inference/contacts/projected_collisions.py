@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 RANGE = 2.0
 """Range of speeds after an outlier, in units of the speed before."""
 
-_HEIGHTS = 20
+_HEIGHTS = 16
 # Error of distances, relative to the sum of the radii, from the steps between values of
 # `RadiusExcess` that are compared.
 _SCALE_STEP = 0.001
@@ -135,19 +135,23 @@ def _tilts(
     measured with its error. The densities are those of this distance, relative to the sum of the
     radii, together with the tilt: their sum over the tilts tells how likely the radii are.
     """
-    tilt = (np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS
+    # Dense where lines are level: there a small tilt changes how well the speeds are known.
+    ends = (np.arange(_HEIGHTS + 1) / _HEIGHTS) ** 2
+    tilt = ((np.arange(_HEIGHTS) + 0.5)[None, :] / _HEIGHTS) ** 2
     known = seen.reach - seen.measured
     reach = seen.measured * (1.0 - excess.measured) + known
     reach = ((1.0 - excess.all_radii) * reach)[:, None]
     free = seen.height[:, None] - 2.0 * seen.radii
     above = tilt * reach
     room = np.minimum(free.min(axis=1)[:, None], 0.5 * free.sum(axis=1)[:, None] - above)
+    room = np.maximum(room, 0.0) * np.diff(ends)
     # In a tray as high as a bead all lines of centres are level.
     room[:, 0] = np.where(room.max(axis=1) > 0.0, room[:, 0], 1.0)
-    room = np.maximum(room, 0.0)
     error = np.hypot(seen.distance_error, _SCALE_STEP * seen.reach)[:, None]
-    square = ((reach * np.sqrt(1.0 - tilt**2) - seen.distance[:, None]) / error) ** 2
-    density = seen.reach[:, None] / (_SQRT_2_PI * error) * np.exp(-0.5 * square)
+    # Distances may be known better than these tilts are apart: the mean from tilt to tilt.
+    distances = reach * np.sqrt(1.0 - ends**2)
+    shares = ndtr((distances - seen.distance[:, None]) / error)
+    density = seen.reach[:, None] * np.diff(shares) / np.diff(distances)
     return tilt, room / room.sum(axis=1)[:, None] * density
 
 
