@@ -83,7 +83,7 @@ def test_every_table_has_units_and_provenance_that_json_can_hold(campaign):
 def test_the_summary_tells_restitutions_with_intervals(campaign):
     text, page = repr(campaign), campaign._repr_html_()
     assert '2 recordings, 2 cycles' in text
-    assert f"{campaign.cor['restitution'][0]:.3f}" in text
+    assert f'{campaign.cor["restitution"][0]:.3f}' in text
     assert 'decay and contacts together' in page
     assert page.count('<tr>') == 3
     assert '--' not in text
