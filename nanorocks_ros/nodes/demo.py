@@ -61,8 +61,8 @@ class DemoNode(NanorocksNode):
         self.listen(topics.COR, self._receive_cor, _TRAY, required=False)
         self.listen(topics.TRUTH, self._receive_truth, _TRAY, required=False)
         print(
-            f'starting the nodes: {", ".join(_GRAPH)}; the first start on a machine compiles '
-            'them, for minutes',
+            f'starting the nodes: {", ".join(_GRAPH)}; the first start on a machine compiles for '
+            'minutes',
             flush=True,
         )
         self._deadline = time.monotonic() + _STARTED_WITHIN_S

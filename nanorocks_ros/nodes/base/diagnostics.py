@@ -98,8 +98,8 @@ class Diagnostics:
         self.values['frames missing'] = count
         if self._is_due('frames missing', _REPEAT_MISSING_S):
             self._node.get_logger().warning(
-                f'{topic}: {counted(count, "frame")} missing so far (gaps between the time stamps): '
-                f'lost in transport, or this machine is too slow; {_FASTER}'
+                f'{topic}: {counted(count, "frame")} missing so far (gaps between the time '
+                f'stamps): lost in transport, or this machine is too slow; {_FASTER}'
             )
 
     def _missing_frames(self) -> Problem | None:
