@@ -86,7 +86,7 @@ def test_without_a_command_the_help_is_printed(capsys, words):
         (['qqq'], 'qqq: no command of nanorocks; see nanorocks --help'),
         (
             ['speeds', '--rate'],
-            '--rate: no option of nanorocks speeds; see nanorocks speeds --help',
+            '--rate: no option of nanorocks speeds; see nanorocks speeds --help-all',
         ),
         (['--vrsion'], '--vrsion: no option of nanorocks; did you mean --version?'),
         # Before anything is said to be missing.
