@@ -257,8 +257,8 @@ def _camera_problems(info: BagInfo) -> list[Problem]:
     if report.gaps:
         problems.append(
             Problem(
-                f'frames are missing at {counted(report.gaps, "place")}, {report.longest_gap:.2f} s '
-                'at most',
+                f'frames are missing at {counted(report.gaps, "place")}, '
+                f'{report.longest_gap:.2f} s at most',
                 'none needed if the camera was paused; speeds across gaps are not computed',
             )
         )
