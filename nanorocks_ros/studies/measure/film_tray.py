@@ -165,7 +165,7 @@ def _guesses(filmed: FilmedTray) -> list[str]:
     if filmed.height is None:
         remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm and --diameter-mm'
         notices.append(
-            'the height of the container is not told; how far collisions are tilted out of the '
+            'the height of the container is not given; how far collisions are tilted out of the '
             f'picture follows from the distances of the beads at them; tell it by {remedy}, the '
             'diameter for one layer'
         )
@@ -228,7 +228,7 @@ def _perspective(filmed: FilmedTray, size: tuple[int, int]) -> Perspective | Non
         if max(abs(along / back - 1.0), abs(down / up - 1.0), abs(diagonals - 1.0)) > _MAX_SKEW:
             raise ConfigurationError(
                 '--corners',
-                f'form no upright rectangle: one is {off:.0f} px off, and its sides are not told',
+                f'form no upright rectangle: one is {off:.0f} px off, and its sides are not given',
                 'add --sides-mm LENGTH WIDTH, film straight from above, or calibrate the camera '
                 '(`nanorocks calibrate`); two opposite corners take the box around the container '
                 'as it is',

@@ -261,7 +261,7 @@ def _in_order(
         if math.isfinite(look.diameter):
             nearest = min(sizes, key=lambda size: abs(math.log(size.diameter / look.diameter)))
             if abs(nearest.diameter / look.diameter - 1.0) > _MAX_TOLD_ERROR:
-                return f'none of the discs has the {look.diameter:.1f} px that are told'
+                return f'none of the discs has the {look.diameter:.1f} px that are given'
             sizes.remove(nearest)
             chosen[k] = nearest
     left = [k for k in range(len(looks)) if k not in chosen]

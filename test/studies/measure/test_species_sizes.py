@@ -43,7 +43,7 @@ def test_a_size_that_is_told_is_that_of_its_species(film):
     looks = [SpeciesLook(diameter=20.0), SpeciesLook()]
     assert diameters(species_sizes(film, looks)) == pytest.approx([21.0, 14.0], abs=0.3)
     looks = [SpeciesLook(diameter=40.0), SpeciesLook()]
-    assert species_sizes(film, looks) == 'none of the discs has the 40.0 px that are told'
+    assert species_sizes(film, looks) == 'none of the discs has the 40.0 px that are given'
 
 
 def test_three_sizes_are_found():
