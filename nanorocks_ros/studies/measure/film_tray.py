@@ -166,7 +166,7 @@ def _guesses(filmed: FilmedTray) -> list[str]:
         remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm and --diameter-mm'
         notices.append(
             'the height of the container is not given; how far collisions are tilted out of the '
-            f'picture follows from the distances of the beads at them; tell it by {remedy}, the '
+            f'picture follows from the distances of the beads at them; give it by {remedy}, the '
             'diameter for one layer'
         )
     if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
@@ -262,7 +262,7 @@ def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float
     if by_beads:
         return float(np.mean(by_beads)), ''
     return filmed.beads[0].diameter_px / _NOMINAL_DIAMETER, (
-        'no length is told: results are in px; --diameter-mm gives them in mm'
+        'no length is given: results are in px; --diameter-mm gives them in mm'
     )
 
 

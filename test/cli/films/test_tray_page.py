@@ -46,7 +46,7 @@ def browsed(film, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        url = re.search(r'http://127\.0\.0\.1:\d+/\?token=\S+(?=;)', process.stdout.readline())
+        url = re.search(r'http://127\.0\.0\.1:\d+/\?token=\S+', process.stdout.readline())
         yield process, url[0], output
         process.kill()
 
