@@ -163,11 +163,11 @@ def _guesses(filmed: FilmedTray) -> list[str]:
     if filmed.sides is not None and not filmed.corners_px:
         notices.append('the sides of the container are of no use without --corners')
     if filmed.height is None:
-        remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm and --diameter-mm'
+        remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm with --diameter-mm'
         notices.append(
             'the height of the container is not given; how far collisions are tilted out of the '
-            f'picture follows from the distances of the beads at them; give it by {remedy}, the '
-            'diameter for one layer'
+            f'picture follows from the distances of the beads; {remedy} gives it (for a single '
+            'layer the diameter)'
         )
     if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
         notices.append(
