@@ -1,4 +1,4 @@
-"""Coefficient of restitution, with an honest interval, from films of a granular gas.
+"""Coefficient of restitution, with its interval, from films of a granular gas.
 
 Five lines take a film to its contacts and the restitution::
 

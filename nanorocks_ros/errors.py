@@ -79,8 +79,9 @@ def did_you_mean(word: str, known: Iterable[str] | Mapping[str, str]) -> str:
     from difflib import get_close_matches
 
     proposed = known if isinstance(known, Mapping) else {name: name for name in known}
-    by_letters = {name.casefold(): proposal for name, proposal in proposed.items()}
-    nearest = get_close_matches(word.casefold(), by_letters, n=2, cutoff=0.7)
+    # The dashes of all options are alike.
+    by_letters = {name.casefold().lstrip('-'): proposal for name, proposal in proposed.items()}
+    nearest = get_close_matches(word.casefold().lstrip('-'), by_letters, n=2, cutoff=0.7)
     proposals = dict.fromkeys(by_letters[name] for name in nearest)
     return f'did you mean {" or ".join(proposals)}?' if proposals else ''
 

@@ -26,7 +26,7 @@ from nanorocks_ros.outputs.tables.table_columns import float_columns
 from nanorocks_ros.recordings.film.video import Video
 from nanorocks_ros.recordings.offered_qos import recorded_qos
 from nanorocks_ros.studies.analysis.results.result_tables import read_columns
-from nanorocks_ros.studies.batch.batch_task import read_summary
+from nanorocks_ros.studies.batch.bag_summary import read_summary
 from nanorocks_ros.studies.sweeps.sweep_parts import COUNTS
 from nanorocks_ros.studies.sweeps.sweep_plan import Axis
 from nanorocks_ros.studies.sweeps.sweep_result import CURVES, Sweep

@@ -60,7 +60,7 @@ class BatchProgress:
         """Count a recording that is finished or failed."""
         from tqdm import tqdm
 
-        from nanorocks_ros.studies.batch.batch_task import DONE
+        from nanorocks_ros.studies.batch.bag_summary import DONE
 
         self._left.pop(name, None)
         self._frames += outcome.frames

@@ -33,6 +33,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the checks and print the findings; 1 where a graph cannot run, else 0."""
+    from nanorocks_ros.outputs.safe_text import counted
     from nanorocks_ros.tools.doctor.findings import Status, worst
 
     findings = _graph_findings(options) if options.graph else _machine_findings(options)
@@ -50,7 +51,8 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({'status': verdict.value, 'checks': checks}))
     else:
         counts = [sum(finding.status is status for finding in findings) for status in Status]
-        print(f'{counts[0]} ok, {counts[1]} warnings, {counts[2]} problems')
+        ok, warnings, problems = counts
+        print(f'{ok} ok, {counted(warnings, "warning")}, {counted(problems, "problem")}')
     return _EXIT_PROBLEM if verdict is Status.PROBLEM else 0
 
 

@@ -114,7 +114,7 @@ class FilmServer:
         )
         self.url = f'http://{_HOST}:{port}/?token={self._access.token}'
         # Printed, not logged: the token is in the address.
-        print(f'nanorocks: open {self.url}; Ctrl-C ends without saving', flush=True)
+        print(f'nanorocks: open {self.url} (Ctrl-C ends without saving)', flush=True)
         try:
             await self._saved.wait()
             # The page is told before the connection ends.

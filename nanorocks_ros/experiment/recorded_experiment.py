@@ -289,7 +289,7 @@ def _contradictions(
         return []
     own_text = ', '.join(f'{name} {own}' for name, own, _ in pairs)
     other_text = ', '.join(f'{name} {other}' for name, _, other in pairs)
-    return [f'{place}: says {other_text}; {own_text} is told and used']
+    return [f'{place}: says {other_text}; {own_text} is given and used']
 
 
 def _trays_text(trays: Collection[int]) -> str:

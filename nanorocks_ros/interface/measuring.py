@@ -79,7 +79,7 @@ def measure(
         if not own.recorded.trays_known:
             raise ConfigurationError(
                 own.recording.name,
-                'nothing is told of its beads',
+                'nothing is known of its beads',
                 'give their diameter in the picture, as diameter_px=31 or "auto", or a trays_file',
             )
         plan = MeasurePlan(

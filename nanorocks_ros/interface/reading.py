@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.errors import RecordingError, did_you_mean_file
 from nanorocks_ros.interface.python_words import in_python
 from nanorocks_ros.interface.record_frames import table_frame
 from nanorocks_ros.interface.results.analysis_reading import analysis_of
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.interface.inputs import PathLike
     from nanorocks_ros.interface.results.analysis_result import AnalysisResult
+
+
+_REMEDY = 'name what a command wrote'
 
 
 def read(path: PathLike) -> AnalysisResult | MeasureResult | TablesResult:
@@ -60,10 +63,11 @@ def read(path: PathLike) -> AnalysisResult | MeasureResult | TablesResult:
             return _sweep(own)
         if own.suffix in TABLES and own.is_file():
             return _tables([own], own)
+        if not own.exists():
+            remedy = did_you_mean_file(own) or _REMEDY
+            raise RecordingError(str(path), 'does not exist', remedy)
         if not own.is_dir():
-            raise RecordingError(
-                str(path), 'is no folder and no table', 'name what a command wrote'
-            )
+            raise RecordingError(str(path), 'is no folder and no table', _REMEDY)
         if is_measured(own):
             return MeasureResult(own)
         if any(own.rglob(RESULTS_MARK)):

@@ -224,7 +224,8 @@ def with_interval(value: float, interval: tuple[float, float], factor: float = 1
     if not math.isfinite(value):
         return NOT_KNOWN
     lower, upper = (factor * end for end in interval)
-    decimals = _decimals(0.25 * (upper - lower)) if upper > lower else 3
+    # An error of 0.98 has the digits of one of 1.0.
+    decimals = _decimals(0.25 * (upper - lower) / 0.95) if upper > lower else 3
     return f'{factor * value:.{decimals}f} [{lower:.{decimals}f}, {upper:.{decimals}f}]'
 
 

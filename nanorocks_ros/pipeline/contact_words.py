@@ -150,7 +150,7 @@ def _no_collisions(contacts: TrackContacts) -> str:
 def _no_rebounds(contacts: TrackContacts) -> str:
     if contacts.walls is not None and not contacts.walls.any:
         return (
-            'no walls are told, and nowhere did beads turn back three times at one place; '
+            'no walls are given, and nowhere did beads turn back three times at one place; '
             '--corners and --sides-mm tell where they are'
         )
     return (

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import IdentityLens, View
+from nanorocks_ros.inference.contacts.impact_tables import rebound_impacts
+from nanorocks_ros.inference.contacts.restitution_exponent import MIN_CONTACTS
+from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
+from nanorocks_ros.numerics.picture_jitter import JitterMeter
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
     Measured,
+    PairCollision,
     Rebound,
     SpeedEstimate,
     SpeedMethod,
@@ -28,8 +35,12 @@ from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.preprocess.shaking.shaking_cycles import CycleFollower
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
+if TYPE_CHECKING:
+    from nanorocks_ros.experiment.trays import Tray
+
 _SIDE = 160
 _REGION = (40, 40, 80, 80)
+_PICTURE_NS, _TENTH_NS = 33_333_333, 100_000_000
 
 
 def warm_up_counting() -> None:
@@ -77,32 +88,26 @@ def warm_up() -> None:
             image = noise[2 if number == 9 else number % 2]
             pixels = image if encoding == 'bgr8' else np.ascontiguousarray(image[:, :, 0])
             stage.push(Frame(stamp_ns=number, encoding=encoding, image=pixels))
+    jitter = JitterMeter()
+    # Enough displacements for a judgement.
+    for number in range(20):
+        jitter.push(number / 30.0, 0.0, 0.0, 0.1)
 
 
 def warm_up_cooling() -> None:
-    """Estimate the restitution of a decay and a rebound."""
-    fitter = RestitutionEstimator(PipelineSettings(), load_trays()[1])
-    rebound = Rebound(
-        stamp_ns=2_000_000_000,
-        tray=1,
-        track=0,
-        species=0,
-        wall=0,
-        incoming=Measured(0.003, 1e-4),
-        outgoing=Measured(0.0028, 1e-4),
-        tangential_incoming=0.0,
-        tangential_outgoing=0.0,
-        tangential_error=1e-4,
-        wall_velocity=Measured(0.0, 0.0),
-        place=np.zeros(2),
-    )
-    fitter.push(rebound)
+    """Estimate the restitution of a decay and of some contacts."""
+    tray = load_trays()[1]
+    fitter = RestitutionEstimator(PipelineSettings(), tray)
     for number in range(1, 60):
-        time_ns = number * 100_000_000
-        speed = 0.005 / (1.0 + 1e-10 * time_ns)
+        stamp_ns = number * _TENTH_NS
+        speed = 0.005 / (1.0 + 1e-10 * stamp_ns)
+        # Contacts of a gas that cools, enough for an exponent.
+        if number >= 60 - MIN_CONTACTS:
+            fitter.push(_rebound(stamp_ns, speed))
+            fitter.push(_collision(stamp_ns, speed, tray))
         fitter.push(
             SpeedEstimate(
-                stamp_ns=time_ns,
+                stamp_ns=stamp_ns,
                 tray=1,
                 cycle=1,
                 cycle_start_ns=0,
@@ -112,6 +117,52 @@ def warm_up_cooling() -> None:
             )
         )
     fitter.flush()
+    # Asked only where contacts contradict the decay.
+    impacts = rebound_impacts([_rebound(_TENTH_NS, 0.005)])
+    frictions, weights = np.array([0.0, 0.01]), np.array([0.5, 0.5])
+    rubbed_likelihood(impacts, Measured(0.0, 0.1), (frictions, weights))
+
+
+def _rebound(stamp_ns: int, speed: float) -> Rebound:
+    return Rebound(
+        stamp_ns=stamp_ns,
+        tray=1,
+        cycle=1,
+        track=0,
+        species=0,
+        wall=0,
+        incoming=Measured(speed, 0.02 * speed),
+        outgoing=Measured(0.95 * speed, 0.02 * speed),
+        tangential_incoming=0.0,
+        tangential_outgoing=0.0,
+        tangential_error=0.02 * speed,
+        wall_velocity=Measured(0.0, 0.0),
+        place=np.zeros(2),
+    )
+
+
+def _collision(stamp_ns: int, speed: float, tray: Tray) -> PairCollision:
+    """A bead that hits one at rest."""
+    mass = tray.species[0].mass
+    return PairCollision(
+        stamp_ns=stamp_ns,
+        tray=1,
+        cycle=1,
+        tracks=np.array([0, 1], dtype=np.int32),
+        species=np.zeros(2, dtype=np.int32),
+        radii=np.full(2, 0.5 * tray.diameter),
+        radius_errors=np.full(2, 1e-6),
+        masses=np.full(2, mass),
+        before=np.array([[speed, 0.0], [0.0, 0.0]]),
+        after=np.array([[0.05 * speed, 0.0], [0.95 * speed, 0.0]]),
+        before_errors=np.full(2, 0.02 * speed),
+        after_errors=np.full(2, 0.02 * speed),
+        separation=np.array([0.95 * tray.diameter, 0.0]),
+        separation_error=1e-5,
+        temperatures=np.full(2, speed**2),
+        height=tray.dimensions[2],
+        place=np.full(2, 5e-3),
+    )
 
 
 def warm_up_contacts() -> None:
@@ -124,7 +175,7 @@ def warm_up_contacts() -> None:
         away = radius + 1e-4 * abs(number - 44.6)
         places = [(away, 3e-3), (7.5e-3 - away, 11e-3), (7.5e-3 + away, 11e-3)]
         tracks = Tracks(
-            stamp_ns=number * 33_333_333,
+            stamp_ns=number * _PICTURE_NS,
             tray=tray.number,
             ids=np.arange(3, dtype=np.int32),
             species=np.zeros(3, dtype=np.int32),
@@ -157,7 +208,13 @@ def warm_up_speed() -> None:
                 cv2.circle(color, (place, 20 + number), 12, (30, 30, 200), -1)
                 cv2.circle(color, (place, 60 - number), 7, (200, 60, 30), -1)
             gray = np.ascontiguousarray(color[:, :, 0])
-            stamp_ns = number * 33_333_333
-            image = TrayImage(stamp_ns=stamp_ns, tray=tray.number, gray=gray, color=color)
+            image = TrayImage(
+                stamp_ns=number * _PICTURE_NS,
+                tray=tray.number,
+                gray=gray,
+                color=color,
+                displacement=(0.0, 0.0),
+                displacement_error=1e-6,
+            )
             estimator.push(image)
     warm_up_contacts()

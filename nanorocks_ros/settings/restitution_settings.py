@@ -152,7 +152,7 @@ class PriorSettings:
     friction: float = setting(
         0.0,
         'coefficient of friction of beads on floor, lid and walls, such as measured with spare '
-        'beads; 0: unknown, to be told by rebounds, without which beads count as smooth',
+        'beads; 0: unknown, to be found by rebounds, without which beads count as smooth',
         low=0.0,
         high=0.15,
     )

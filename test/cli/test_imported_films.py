@@ -124,7 +124,7 @@ def test_what_is_neither_film_nor_bag_is_told_apart(tmp_path, capsys):
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'videos').mkdir()
     film = write_video(tmp_path / 'videos' / 'a.avi', range(4))
-    assert 'trays is told by --trays-file' in refused(
+    assert 'trays is given by --trays-file' in refused(
         ['info', str(tmp_path / 'mine.yaml')], capsys
     )
     assert 'the folder of all its images' in refused(['info', str(tmp_path / 'one.png')], capsys)

@@ -120,8 +120,14 @@ def test_a_sweep_is_one_table_of_curves(tmp_path):
 
 
 def test_what_is_no_result_says_what_to_do(tmp_path):
-    with pytest.raises(nr.RecordingError, match='no folder and no table'):
+    with pytest.raises(nr.RecordingError, match='does not exist; name what a command wrote'):
         nr.read(tmp_path / 'none')
+    (tmp_path / 'results').mkdir()
+    with pytest.raises(nr.RecordingError, match=r'does not exist; did you mean .*results\?'):
+        nr.read(tmp_path / 'result')
+    (tmp_path / 'notes.txt').touch()
+    with pytest.raises(nr.RecordingError, match='no folder and no table'):
+        nr.read(tmp_path / 'notes.txt')
     (tmp_path / 'metadata.yaml').write_text('rosbag2_bagfile_information: {}\n')
     with pytest.raises(nr.RecordingError, match=r'is a recording.*nr\.analyse'):
         nr.read(tmp_path)

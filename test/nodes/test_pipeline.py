@@ -215,4 +215,4 @@ def test_what_is_told_to_the_pipeline_replaces_what_the_bag_says(graph):
     )  # fmt: skip
     finished = graph.wait(process)
     assert finished.code == 0, finished.output
-    assert finished.output.count('preprocess.pixels_per_metre 13400.0 is told and used') == 1
+    assert finished.output.count('preprocess.pixels_per_metre 13400.0 is given and used') == 1

@@ -115,4 +115,7 @@ def test_an_interval_has_the_digits_that_its_length_leaves():
     assert with_interval(0.8931, (0.8652, 0.9191)) == '0.893 [0.865, 0.919]'
     assert with_interval(2.981e-3, (2.39e-3, 3.701e-3), 1e3) == '2.98 [2.39, 3.70]'
     assert with_interval(0.797, (0.2, 0.992)) == '0.80 [0.20, 0.99]'
+    # Lengths of 0.0039 and 0.0041 leave the same digits.
+    assert with_interval(0.98999, (0.98801, 0.99197)) == '0.9900 [0.9880, 0.9920]'
+    assert with_interval(0.99, (0.98794, 0.99206)) == '0.9900 [0.9879, 0.9921]'
     assert with_interval(float('nan'), (0.0, 1.0)) == '–'

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from sticking_records import cooling
@@ -67,3 +70,51 @@ def test_the_estimates_of_a_first_cycle_compile_nothing_more():
     assert results[-1].restitution.value == pytest.approx(0.9, abs=0.2)
     assert meter.of_cycle(1, 20 * NS) is not None
     assert compiled_for() == before
+
+
+# In a process of its own: what other tests compiled would count as compiled beforehand.
+FIRST_CYCLE = """
+import gc
+from numba.core.registry import CPUDispatcher
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.pipeline import warm_up
+from nanorocks_ros.pipeline.composition import TrayStages, trays_of
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
+from nanorocks_ros.simulation.tray_camera.tray_film import film
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
+
+def compiled():
+    kernels = [kept for kept in gc.get_objects() if isinstance(kept, CPUDispatcher)]
+    return {(kernel.py_func.__name__, str(key)) for kernel in kernels for key in kernel.overloads}
+
+settings = with_values(PipelineSettings(), {'preprocess.pixels_per_metre': 13500.0}, 'test')
+camera = SimulationSettings(
+    width_px=240, height_px=240, pixels_per_metre=13500.0, restitution=0.8, seed=3
+)
+frames = [frame for frame, _ in film(camera, load_trays()[1], 420)]
+preprocessor = Preprocessor(settings, trays_of(settings), 'test')
+stages = TrayStages.of(settings, load_trays()[1])
+for prepare in (
+    warm_up.warm_up,
+    warm_up.warm_up_speed,
+    warm_up.warm_up_clusters,
+    warm_up.warm_up_cooling,
+):
+    prepare()
+before = compiled()
+results = []
+for frame in frames:
+    for record in preprocessor.push(frame):
+        results += stages.push(record)
+results += stages.flush()
+print([type(record).__name__ for record in results].count('CorEstimate'))
+print(sorted(compiled() - before))
+"""
+
+
+def test_a_first_cycle_of_a_film_compiles_nothing_more():
+    command = [sys.executable, '-c', FIRST_CYCLE]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    estimates, later = done.stdout.splitlines()
+    assert int(estimates) > 5
+    assert later == '[]'

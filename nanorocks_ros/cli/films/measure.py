@@ -115,7 +115,7 @@ def _settings(options: argparse.Namespace, bag: Path) -> RecordedSettings:
         film = shlex.quote(options.named[0])
         raise ConfigurationError(
             options.named[0],
-            'nothing is told of its beads',
+            'nothing is known of its beads',
             f'have their diameter found: nanorocks measure {film} --diameter-px auto -o '
             f'{shlex.quote(options.output)}; or give it in px, or a file, as --trays-file '
             'mine.yaml',

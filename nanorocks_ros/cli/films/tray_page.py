@@ -54,7 +54,7 @@ def check_browsing(options: argparse.Namespace) -> None:
         if getattr(options, name):
             raise ConfigurationError(
                 f'--{name.replace("_", "-")}',
-                'is told in the browser',
+                'is given in the browser',
                 'leave it out, or leave out --browse',
             )
 
@@ -115,7 +115,7 @@ def options_of(form: Mapping[str, Any], options: argparse.Namespace) -> argparse
     told.corners = _numbers(form, 'corners') or None
     told.sides_mm = _numbers(form, 'sides_mm') or None
     if told.sides_mm and len(told.sides_mm) != 2:
-        raise ConfigurationError('--sides-mm', 'one of two is told', 'give both, or none')
+        raise ConfigurationError('--sides-mm', 'only one of two is given', 'give both, or none')
     height = _numbers({'height_mm': [form.get('height_mm')]}, 'height_mm')
     told.height_mm = height[0] if height else None
     species = form.get('species')

@@ -200,11 +200,11 @@ def _print_notices(imported: ImportResult) -> None:
 def _print_left_out(files: list[Path]) -> None:
     if not files:
         return
-    from nanorocks_ros.outputs.safe_text import printable
+    from nanorocks_ros.outputs.safe_text import counted, printable
 
     names = [*(printable(file.name) for file in files[:_NAMED]), *['...'] * (len(files) > _NAMED)]
     print(
-        f'nanorocks: skipped {len(files)} files without a supported video extension '
+        f'nanorocks: skipped {counted(len(files), "file")} without a supported video extension '
         f'({", ".join(names)}); name a file to import it anyway',
         file=sys.stderr,
     )
@@ -227,12 +227,14 @@ def _print_failures(batch: ImportBatch) -> int:
 
 
 def _text(imported: ImportResult) -> str:
-    from nanorocks_ros.outputs.safe_text import printable
+    from nanorocks_ros.outputs.safe_text import counted, printable
 
     dropped = imported.duplicates_dropped
+    repeats = f', {counted(dropped, "duplicate")} dropped' if dropped else ''
     return (
-        f'{printable(imported.bag)}: {imported.frames} frames, {imported.duration:.3f} s'
-        f'{f", {dropped} duplicates dropped" if dropped else ""}, '
+        f'{printable(imported.bag)}: {counted(imported.frames, "frame")}, '
+        f'{imported.duration:.3f} s'
+        f'{repeats}, '
         f'{imported.provenance["pictures"]}'
     )
 

@@ -89,6 +89,7 @@ def _topic_as_json(report: TopicReport) -> dict[str, Any]:
 
 
 def _print(info: BagInfo) -> None:
+    from nanorocks_ros.outputs.safe_text import counted
     from nanorocks_ros.recordings.messages.iso8601 import format_iso8601
 
     state = 'complete' if info.complete else 'NOT complete'
@@ -97,7 +98,11 @@ def _print(info: BagInfo) -> None:
         print(f'from {format_iso8601(info.start_ns)} to {format_iso8601(info.end_ns)}')
     for report in info.topics.values():
         rate = f', {report.rate:.4g} Hz' if report.rate else ''
-        gaps = f', {report.gaps} gaps of up to {report.longest_gap:.2f} s' if report.gaps else ''
+        gaps = (
+            f', {counted(report.gaps, "gap")} of up to {report.longest_gap:.2f} s'
+            if report.gaps
+            else ''
+        )
         name, kind = _shown(report.info.name), _shown(report.info.type)
         print(f'  {name} [{kind}]: {len(report.stamps_ns)}{rate}{gaps}')
     if info.pictures:

@@ -89,7 +89,7 @@ function showAnswer(answer) {
   at('error').hidden = !answer.error;
   at('error').textContent = answer.error ?? '';
   at('save').disabled = !!answer.error;
-  say(answer.error ? 'error' : 'ok', answer.error ? 'not usable as told' : 'recognised');
+  say(answer.error ? 'error' : 'ok', answer.error ? 'not usable as described' : 'recognised');
   if (result && !species[0].marked && result.beads.length) {
     species[0].bead = result.beads[0].map((value) => Math.round(10 * value) / 10);
   }

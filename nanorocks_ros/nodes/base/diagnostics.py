@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from nanorocks_ros.errors import FrameError
 from nanorocks_ros.nodes.base.problems import FRAMES_LOST, Level, Losses, Problem, Refusals
+from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.records import CorEstimate, Headline, SpeedEstimate, TrayImage
 from nanorocks_ros.settings import PriorSettings, priors_in_words
 
@@ -97,8 +98,8 @@ class Diagnostics:
         self.values['frames missing'] = count
         if self._is_due('frames missing', _REPEAT_MISSING_S):
             self._node.get_logger().warning(
-                f'{topic}: {count} frames missing so far (gaps between the time stamps): lost in '
-                f'transport, or this machine is too slow; {_FASTER}'
+                f'{topic}: {counted(count, "frame")} missing so far (gaps between the time '
+                f'stamps): lost in transport, or this machine is too slow; {_FASTER}'
             )
 
     def _missing_frames(self) -> Problem | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.nodes.base.communication.ros_messages import beads_message, camera_info_message
@@ -39,7 +40,14 @@ class SimulatedScene:
     ) -> None:
         self._node = node
         self._start_ns: int | None = None
-        self._film = SceneFilm(simulation, without_effects(scene) if effects == 'none' else scene)
+        seen = without_effects(scene) if effects == 'none' else scene
+        # Compile what the first shaking event needs, or the frames after it would be late.
+        shaken = SceneFilm(
+            replace(simulation, first_shake=0.0), replace(seen, trays=seen.trays[:1])
+        )
+        for _ in islice(shaken.moments(), 2):
+            pass
+        self._film = SceneFilm(simulation, seen)
         for tray in scene.trays:
             node.outputs.offer((topics.TRUTH, topics.BEADS), tray)
         node.outputs.offer((topics.CAMERA_INFO,))

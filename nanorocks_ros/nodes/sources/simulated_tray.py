@@ -48,6 +48,9 @@ class SimulatedTray:
         self._node = node
         self._start_ns: int | None = None
         tray = tray_by_number(load_trays(trays_file), simulation.tray)
+        # Compile what the first shaking event needs, or the frames after it would be late.
+        for _ in film(replace(simulation, first_shake=0.0), tray, 2):
+            pass
         self._film = film(simulation, tray)
 
     def moments(self) -> Iterator[tuple[int, TrayMoment]]:

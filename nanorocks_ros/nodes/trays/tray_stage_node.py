@@ -68,6 +68,10 @@ class TrayStageNode(NanorocksNode):
         self._make_stage = make_stage
         self._settings = self.parameters.declare(default_settings(self), read_only=False)
         self._epoch = Epoch(self, may_set=False)
+        for tray in self._settings.trays:
+            self.outputs.offer(outputs, tray)
+            self.topic_monitor.require_single_publisher(outputs[0].of(tray), ONE_SOURCE)
+        # Meanwhile others discover the publishers, and do not miss them.
         warm_up_counting()
         if in_color:
             warm_up_speed()
@@ -75,10 +79,10 @@ class TrayStageNode(NanorocksNode):
         self.parameters.react_to_changes(self._settings, self._build, self._change)
         self._pushed_ns = dict.fromkeys(self._settings.trays, 0)
         self._sync = {tray: TrayImageSync() for tray in self._settings.trays}
-        self._subscribe(outputs)
+        self._subscribe()
 
-    def _subscribe(self, outputs: Sequence[Topic]) -> None:
-        """Offer the outputs and subscribe to the inputs of every tray."""
+    def _subscribe(self) -> None:
+        """Subscribe to the inputs of every tray."""
         inputs: dict[Topic, Callable[[int, Any], None]] = {
             topics.GRAY: self._receive_gray,
             topics.STATE: self._receive_state,
@@ -87,8 +91,6 @@ class TrayStageNode(NanorocksNode):
             inputs[topics.RECTIFIED] = self._receive_color
         subscriptions = []
         for tray in self._settings.trays:
-            self.outputs.offer(outputs, tray)
-            self.topic_monitor.require_single_publisher(outputs[0].of(tray), ONE_SOURCE)
             subscriptions += [
                 self.listen(topic, partial(receive, tray), tray, required=topic == topics.GRAY)
                 for topic, receive in inputs.items()

@@ -3,9 +3,9 @@
 On two cores a camera of 1080p is followed only if the next frame is decoded and cut while the
 trays of the last one are measured. Most of that work releases Python's lock (compiled functions,
 OpenCV). For a whole plate the rest is too much for one lock, and the thread only passes the work
-on to other processes (`study.shared_pipeline`). Jobs are done one after the other, in order, and
-results come back in the thread of the node: what is published does not depend on timing, and only
-one thread calls ROS.
+on to other processes (`pipeline.parallel_pipeline`). Jobs are done one after the other, in order,
+and results come back in the thread of the node: what is published does not depend on timing, and
+only one thread calls ROS.
 """
 
 from __future__ import annotations

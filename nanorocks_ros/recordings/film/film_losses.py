@@ -102,7 +102,7 @@ def _wrong_times(times: NDArray[np.int64], frames: int) -> Iterator[str]:
     if length < _SHORTEST_STEP_NS * (frames - 1) / NS:
         yield (
             f'shows {frames} frames in {length:.3g} s; if that is not the rate of the camera, '
-            'tell it to `nanorocks import` by --rate, such as --rate 30'
+            'give it to `nanorocks import` by --rate, such as --rate 30'
         )
         return
     for place in np.flatnonzero(_are_far(steps)):

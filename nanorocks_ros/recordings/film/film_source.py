@@ -167,4 +167,4 @@ def rate_remedy(path: Path) -> str:
     """What to do with a film that tells no times, whichever command it was given to."""
     name = shlex.quote(str(path))
     bag = shlex.quote(str(path.with_name(f'{path.stem}_bag')))
-    return f'tell frames per second, such as 30: nanorocks import {name} --rate 30 -o {bag}'
+    return f'give the frames per second, such as 30: nanorocks import {name} --rate 30 -o {bag}'

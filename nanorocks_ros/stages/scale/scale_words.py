@@ -93,7 +93,7 @@ def _one_source(scale: float, tray: Tray, *, of_beads: bool) -> str:
 
 def _wrong_diameter(beads: Sequence[Ruler], tray: Tray) -> str:
     factor = mean_ratio(beads)
-    size = f'{factor:.3f} times as large as told'
+    size = f'{factor:.3f} times as large as given'
     if len(tray.species) == 1:
         size = f'{tray.diameter * factor / _MILLIMETRE:.2f} mm large'
     return (

@@ -207,7 +207,7 @@ def _number_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
 def _contrast_words(counts: SpeciesCounts, scenery: Scenery) -> tuple[str, str]:
     """Why nothing may be seen, and the remedy."""
     if counts.learnt:
-        return '', 'correct diameter_mm, the scale, and colour and look of the species, if told'
+        return '', 'correct diameter_mm, the scale, and colour and look of the species, if given'
     if scenery.contrast == 'bright':
         return ', and the beads look brighter than the floor', 'add `look: bright` to the species'
     if scenery.contrast == 'dark':

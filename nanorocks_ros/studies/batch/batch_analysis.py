@@ -12,16 +12,15 @@ from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.pipeline.composition import Pipeline
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.recordings.film.natural_sort import natural_key
-from nanorocks_ros.studies.batch.batch_store import BatchStore
-from nanorocks_ros.studies.batch.batch_task import (
+from nanorocks_ros.studies.batch.bag_summary import (
     DONE,
     FAILED,
     PARTIAL,
     UNWRITTEN,
-    BagOutcome,
-    analyse_bag,
     read_summary,
 )
+from nanorocks_ros.studies.batch.batch_store import BatchStore
+from nanorocks_ros.studies.batch.batch_task import BagOutcome, analyse_bag
 from nanorocks_ros.studies.batch.manifest_entries import Entry
 
 if TYPE_CHECKING:
@@ -31,7 +30,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.jobs.tasks import Workers
     from nanorocks_ros.recordings.bag.find_bags import FoundBags
     from nanorocks_ros.settings import PipelineSettings
-    from nanorocks_ros.studies.batch.batch_task import BagSummary, BagTask
+    from nanorocks_ros.studies.batch.bag_summary import BagSummary
+    from nanorocks_ros.studies.batch.batch_task import BagTask
 
 # A note on more recordings than this becomes one line.
 _MOST_ALIKE = 3

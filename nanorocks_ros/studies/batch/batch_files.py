@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.experiment.trays import trays_text
 from nanorocks_ros.settings import rows
-from nanorocks_ros.studies.batch.batch_report import write_batch_report
 from nanorocks_ros.studies.batch.batch_tables import write_tables
+from nanorocks_ros.studies.batch.report.batch_report import write_batch_report
 from nanorocks_ros.studies.results.run_provenance import run_provenance
 
 if TYPE_CHECKING:

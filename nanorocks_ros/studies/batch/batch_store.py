@@ -24,13 +24,8 @@ from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.recordings.bag.fingerprint import file_states, total_size
 from nanorocks_ros.settings import rows
 from nanorocks_ros.studies.analysis.results.results_folder import SUMMARY
-from nanorocks_ros.studies.batch.batch_task import (
-    DONE,
-    PARTIAL,
-    BagOutcome,
-    BagTask,
-    read_summary,
-)
+from nanorocks_ros.studies.batch.bag_summary import DONE, PARTIAL, read_summary
+from nanorocks_ros.studies.batch.batch_task import BagOutcome, BagTask
 from nanorocks_ros.studies.batch.manifest_entries import (
     BAGS,
     Entry,

@@ -9,11 +9,10 @@ import json
 import time
 import traceback
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, TypedDict, cast
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import cv2
-import numpy as np
 
 from nanorocks_ros.errors import NanorocksError, RecordingError, UnwritableError
 from nanorocks_ros.experiment.recorded_experiment import (
@@ -23,16 +22,22 @@ from nanorocks_ros.experiment.recorded_experiment import (
 )
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.outputs.atomic_files import write_bytes
-from nanorocks_ros.outputs.json_values import json_values, read_object
-from nanorocks_ros.outputs.named_recordings import with_recording
-from nanorocks_ros.outputs.npz_archive import Arrays, write_archive
+from nanorocks_ros.outputs.npz_archive import write_archive
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.recordings.bag.fingerprint import FileState, content_hash, file_states
-from nanorocks_ros.studies.analysis.cycle_summaries import SIZE_MEASURES, CycleSummary, cycles_of
-from nanorocks_ros.studies.analysis.offline_analysis import Analysis, analyse
+from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results.results_folder import EVIDENCE, SUMMARY, write_results
-from nanorocks_ros.studies.analysis.results.results_json import as_json
+from nanorocks_ros.studies.batch.bag_summary import (
+    FAILED,
+    FORMAT,
+    UNWRITTEN,
+    BagSummary,
+    cycles_by_measure,
+    evidence_arrays,
+    read_summary,
+    summary_of,
+)
 from nanorocks_ros.studies.batch.batch_statistics import TrackCollector, write_statistics
 
 if TYPE_CHECKING:
@@ -41,11 +46,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.settings import PipelineSettings
 
 TROUBLE = 'trouble.txt'
-DONE, PARTIAL, FAILED, UNWRITTEN = 'done', 'partial', 'failed', 'unwritten'
 # Interval of progress notes, [s].
 _NOTE = 1.0
-# Provenance kept of a recording: so many entries, each so long.
-_MOST_ENTRIES, _LONGEST = 100, 500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,56 +114,6 @@ class BagOutcome:
     folder: str = ''
 
 
-class TraySummary(TypedDict):
-    """One tray in a `BagSummary`; see `results_json` for the keys of a cycle."""
-
-    cycles: list[dict[str, Any]]
-    recognition: list[dict[str, Any]]
-    truth: dict[str, Any] | None
-    by_cycle: dict[str, list[dict[str, Any]]]
-
-
-class BagSummary(TypedDict):
-    """The JSON object `SUMMARY` in the results of a recording.
-
-    Attributes
-    ----------
-    content, film : str
-        Hashes of the recording, and of the film that it was imported from or ''.
-    question : str
-        Hash of the settings.
-    state, reason : str
-        As in `BagOutcome`.
-    start_ns : int, [ns]
-        Stamp of the first frame.
-    experiment : dict of str to str
-        Trays, beads and scale by which it was analysed, as a recording keeps them.
-    trays : dict of str to TraySummary
-        By number.
-    """
-
-    format: int
-    bag: str
-    content: str
-    film: str
-    question: str
-    frames: int
-    frames_lost: int
-    seconds: float
-    complete: bool
-    notices: list[str]
-    state: str
-    reason: str
-    start_ns: int
-    metadata: dict[str, str]
-    experiment: dict[str, str]
-    trays: dict[str, TraySummary]
-
-
-# Of the summary: 2 since flags are words.
-_FORMAT = 2
-
-
 def analyse_bag(task: BagTask) -> BagOutcome:
     """Analyse a recording and write its results, complete or not at all; it never raises."""
     # Other recordings use the other cores.
@@ -222,19 +174,19 @@ def _analysed(task: BagTask) -> BagOutcome:
             str(task.path), 'changed while it was analysed', 'analyse it again when it is complete'
         )
     summary: Any = {
-        'format': _FORMAT,
+        'format': FORMAT,
         'bag': str(task.path),
         'content': content,
         'film': analysis.metadata.get('source_sha256', ''),
         'question': task.question,
         'experiment': metadata_of_settings(settings),
-        **_summary(analysis, task.path),
+        **summary_of(analysis, task.path),
     }
 
     def more(folder: Path) -> None:
         for number, tray in summary['trays'].items():
-            tray['by_cycle'] = _cycles(folder, int(number))
-        write_archive(folder / EVIDENCE, _evidence(analysis))
+            tray['by_cycle'] = cycles_by_measure(folder, int(number))
+        write_archive(folder / EVIDENCE, evidence_arrays(analysis))
         if collector is not None:
             last = {number: tray.cors[-1] for number, tray in analysis.trays.items() if tray.cors}
             trays = load_trays(settings.trays_file or None)
@@ -261,17 +213,6 @@ def _outcome(summary: BagSummary, files: tuple[FileState, ...]) -> BagOutcome:
     )
 
 
-def read_summary(folder: Path) -> BagSummary | None:
-    """The summary in a folder of results; None where there is none that can be read."""
-    try:
-        summary = read_object(folder / SUMMARY)
-    except (OSError, ValueError, RecordingError):
-        return None
-    if summary.get('format') == _FORMAT and set(BagSummary.__annotations__) <= set(summary):
-        return cast('BagSummary', summary)
-    return None
-
-
 def _noting(note: Path) -> Any:
     last = 0.0
 
@@ -285,46 +226,3 @@ def _noting(note: Path) -> Any:
                 note.write_text(f'{done} {total}', 'ascii')
 
     return progress
-
-
-def _summary(analysis: Analysis, recording: Path) -> dict[str, Any]:
-    error = analysis.error
-    return {
-        **with_recording(as_json(analysis, series=False), recording),
-        'notices': [printable(notice) for notice in analysis.notices],
-        'state': DONE if error is None else PARTIAL,
-        'reason': '' if error is None else printable(str(error)),
-        'start_ns': min(analysis.stamps_ns),
-        'metadata': {
-            printable(key)[:_LONGEST]: printable(value)[:_LONGEST]
-            for key, value in list(analysis.metadata.items())[:_MOST_ENTRIES]
-        },
-    }
-
-
-def _cycles(folder: Path, tray: int) -> dict[str, list[dict[str, Any]]]:
-    """Cycles by each measure of cluster size that was known in the recording."""
-    if not (folder / f'tray_{tray}_speed.csv').is_file():
-        return {}
-    by_measure = {}
-    for measure in SIZE_MEASURES:
-        cycles = cycles_of(folder, tray, measure)
-        if measure is SIZE_MEASURES[-1] or _any_size(cycles):
-            by_measure[measure.column] = [json_values(asdict(cycle)) for cycle in cycles]
-    return by_measure
-
-
-def _any_size(cycles: list[CycleSummary]) -> bool:
-    return any(np.isfinite(cycle.cluster_size) for cycle in cycles)
-
-
-def _evidence(analysis: Analysis) -> Arrays:
-    arrays: Arrays = {}
-    for number, results in analysis.trays.items():
-        if results.evidence is not None:
-            for name, values in results.evidence.arrays().items():
-                arrays[f'{number}/cor/{name}'] = values
-        for k, cycle in enumerate(results.sticking):
-            for name in ('times', 'speeds', 'bodies', 'merges'):
-                arrays[f'{number}/sticking/{k:05d}/{name}'] = getattr(cycle, name)
-    return arrays

@@ -66,7 +66,7 @@ def _mixed_settings(results: Sequence[BagResults]) -> list[str]:
     for name in (each for each in EXPERIMENT_SETTINGS if each != _TRAYS):
         key = experiment_key(name)
         values = Counter(
-            str(result.summary['metadata'].get(key, 'not told')) for result in results
+            str(result.summary['metadata'].get(key, 'not stated')) for result in results
         )
         if len(values) < 2:
             continue

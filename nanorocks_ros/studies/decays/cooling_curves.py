@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.errors import ConfigurationError, RecordingError
+from nanorocks_ros.errors import ConfigurationError, RecordingError, did_you_mean_file
 from nanorocks_ros.outputs.tables.csv_tables import number, read_csv
 from nanorocks_ros.recordings.film.video_streams import VIDEO_SUFFIXES
 from nanorocks_ros.studies.decays.decay_curve import SpeedCurve, read_curve
@@ -68,7 +68,7 @@ def speed_table(path: Path, tray: int | None = None) -> tuple[Path, int | None]:
         When the name has the number of another tray.
     """
     if not path.exists():
-        raise RecordingError(str(path), 'does not exist', _FORM)
+        raise RecordingError(str(path), 'does not exist', did_you_mean_file(path) or _FORM)
     if not path.is_dir():
         parts = path.stem.split('_')
         if path.suffix.lower() in VIDEO_SUFFIXES:

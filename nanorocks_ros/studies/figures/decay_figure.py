@@ -127,9 +127,11 @@ def decay_figure(
 
 
 def _headline(tray: Tray, cycles: int) -> str:
-    beads = ' and '.join(f'{each.count} of {each.material}' for each in tray.species)
+    beads = ' and '.join(f'{each.count} {each.material}' for each in tray.species)
+    # The name of a material that nobody named.
+    beads = beads.removesuffix(' beads') + ' beads'
     sides = ' x '.join(f'{1e3 * side:g}' for side in tray.dimensions if np.isfinite(side))
-    return f'Tray {tray.number}, {counted(cycles, "cycle")}; beads: {beads}; {sides} mm'
+    return f'Tray {tray.number}, {counted(cycles, "cycle")}; {beads}; {sides} mm'
 
 
 def _measured_first(axes: Axes) -> tuple[list[Any], list[str]]:

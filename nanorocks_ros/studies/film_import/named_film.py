@@ -72,5 +72,5 @@ def _refuse_file(name: str) -> None:
         raise RecordingError(
             name, 'is one image, not a film', 'name a video, or the folder of all its images'
         )
-    remedy = f'{_REMEDY}; a file of trays is told by --trays-file' if suffix in _YAML else _REMEDY
+    remedy = f'{_REMEDY}; a file of trays is given by --trays-file' if suffix in _YAML else _REMEDY
     raise RecordingError(name, 'is neither a video nor a bag', remedy)

@@ -13,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FrameError, NanorocksError
 from nanorocks_ros.experiment.recorded_experiment import recorded_settings
+from nanorocks_ros.outputs.safe_text import counted
 from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.messages.camera_info import info_from_message, view_from_message
 from nanorocks_ros.recordings.messages.image_messages import image_kind
@@ -256,7 +257,8 @@ def _camera_problems(info: BagInfo) -> list[Problem]:
     if report.gaps:
         problems.append(
             Problem(
-                f'frames are missing at {report.gaps} places, {report.longest_gap:.2f} s at most',
+                f'frames are missing at {counted(report.gaps, "place")}, '
+                f'{report.longest_gap:.2f} s at most',
                 'none needed if the camera was paused; speeds across gaps are not computed',
             )
         )

@@ -163,11 +163,11 @@ def _guesses(filmed: FilmedTray) -> list[str]:
     if filmed.sides is not None and not filmed.corners_px:
         notices.append('the sides of the container are of no use without --corners')
     if filmed.height is None:
-        remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm and --diameter-mm'
+        remedy = '--height-mm' if _is_scale_known(filmed) else '--height-mm with --diameter-mm'
         notices.append(
-            'the height of the container is not told; how far collisions are tilted out of the '
-            f'picture follows from the distances of the beads at them; tell it by {remedy}, the '
-            'diameter for one layer'
+            'the height of the container is not given; how far collisions are tilted out of the '
+            f'picture follows from the distances of the beads; {remedy} gives it (for a single '
+            'layer the diameter)'
         )
     if len(filmed.beads) > 1 and any(beads.density is None for beads in filmed.beads):
         notices.append(
@@ -228,7 +228,7 @@ def _perspective(filmed: FilmedTray, size: tuple[int, int]) -> Perspective | Non
         if max(abs(along / back - 1.0), abs(down / up - 1.0), abs(diagonals - 1.0)) > _MAX_SKEW:
             raise ConfigurationError(
                 '--corners',
-                f'form no upright rectangle: one is {off:.0f} px off, and its sides are not told',
+                f'form no upright rectangle: one is {off:.0f} px off, and its sides are not given',
                 'add --sides-mm LENGTH WIDTH, film straight from above, or calibrate the camera '
                 '(`nanorocks calibrate`); two opposite corners take the box around the container '
                 'as it is',
@@ -262,7 +262,7 @@ def _scale(filmed: FilmedTray, region: tuple[int, int, int, int]) -> tuple[float
     if by_beads:
         return float(np.mean(by_beads)), ''
     return filmed.beads[0].diameter_px / _NOMINAL_DIAMETER, (
-        'no length is told: results are in px; --diameter-mm gives them in mm'
+        'no length is given: results are in px; --diameter-mm gives them in mm'
     )
 
 

@@ -233,7 +233,7 @@ def _of_an_earlier_call(plan: MeasurePlan, number: int) -> str:
     folder = plan.folder / f'tray_{number}'
     if not (folder / RESULTS_MARK).is_file():
         return ''
-    return f'; {folder} is of an earlier call, which was told more'
+    return f'; {folder} is of an earlier call, which was given more'
 
 
 def _noted(note: Path) -> dict[str, Any]:

@@ -193,10 +193,10 @@ def _ambiguous(looks: Sequence[SpeciesLook]) -> str:
     """Why it is not known which discs may be of which species; empty if it is."""
     coloured = sum(look.colour is not None for look in looks)
     if 0 < coloured < len(looks):
-        return 'the colour of some species is told, and that of others is not'
+        return 'the colour of some species is given, and that of others is not'
     signs = {look.sign for look in looks}
     if not coloured and 0 in signs and len(signs) > 1:
-        return 'the look of some species is told, and that of others is not'
+        return 'the look of some species is given, and that of others is not'
     return ''
 
 
@@ -233,7 +233,7 @@ def _sizes_of(
     if mixture.shares.sum() < _LEAST_SHARE:
         return f'{counted(count, "disc")} in {counted(frames, "frame")} have no sizes in common'
     if len(beads) < species or (mixture.shares[others] > _STRAY_SHARE * rarest).any():
-        return f'{species} of one look are told, and discs show with diameters of {seen} px'
+        return f'{species} of one look are given, and discs show with diameters of {seen} px'
     squares = mixture.deviations[beads] ** 2
     scatter = np.sqrt(0.5 * (squares[1:] + squares[:-1]))
     if (np.diff(mixture.means[beads]) < _APART * scatter).any():
@@ -261,7 +261,7 @@ def _in_order(
         if math.isfinite(look.diameter):
             nearest = min(sizes, key=lambda size: abs(math.log(size.diameter / look.diameter)))
             if abs(nearest.diameter / look.diameter - 1.0) > _MAX_TOLD_ERROR:
-                return f'none of the discs has the {look.diameter:.1f} px that are told'
+                return f'none of the discs has the {look.diameter:.1f} px that are given'
             sizes.remove(nearest)
             chosen[k] = nearest
     left = [k for k in range(len(looks)) if k not in chosen]

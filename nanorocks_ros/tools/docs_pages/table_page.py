@@ -105,7 +105,7 @@ def _sections() -> Iterator[str]:
     )
     yield _table(TRACKS)
     yield '## `nanorocks measure`\n'
-    yield 'Of a film of which no length is told, lengths are in px, and columns are `X_px`.\n'
+    yield 'Without a given length, lengths of a film are in px, and columns are `X_px`.\n'
     measured: dict[str, tuple[Column, ...]] = {
         MEAN_SPEEDS: SPEED_COLUMNS,
         CONTACTS: CONTACT_COLUMNS,

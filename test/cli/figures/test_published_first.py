@@ -118,7 +118,7 @@ def test_the_figure_of_an_own_tray_begins_with_what_analyse_told(own, capsys):
     assert 'decay alone 0.790 [0.700, 0.860]' in told
     assert 'closed form of the paper 0.98' in told
     assert values['published'][-1] == 'truth: beads 0.85, walls 0.93'
-    assert text.index('24 of steel; 90 x 60 x 4 mm') < text.index('analyse: beads 0.8480')
+    assert text.index('24 steel beads; 90 x 60 x 4 mm') < text.index('analyse: beads 0.8480')
     # Nothing of the tray of the flight, whose closed form says 0.98 of other beads.
     assert 'acrylic' not in text
 

@@ -35,7 +35,7 @@ def test_without_options_all_is_guessed_and_said(film, tmp_path, capsys):
     printed = capsys.readouterr()
     (species,) = load_trays(output)[1].species
     assert species.expected == 10
-    for part in ('the diameter is guessed: 2', 'no length is told', 'guessed: 10'):
+    for part in ('the diameter is guessed: 2', 'no length is given', 'guessed: 10'):
         assert part in printed.err
     assert f'nanorocks measure {film} --trays-file {output}' in printed.out
 

@@ -46,7 +46,7 @@ def browsed(film, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        url = re.search(r'http://127\.0\.0\.1:\d+/\?token=\S+(?=;)', process.stdout.readline())
+        url = re.search(r'http://127\.0\.0\.1:\d+/\?token=\S+', process.stdout.readline())
         yield process, url[0], output
         process.kill()
 
@@ -117,13 +117,13 @@ def test_what_cannot_be_is_said_in_the_words_of_the_options(look, browsed):
     page = look(url)
     state_is(page, 'recognised')
     page.fill('[data-field=diameter_mm]', '-2')
-    state_is(page, 'not usable as told')
+    state_is(page, 'not usable as described')
     assert page.locator('#error').inner_text() == '--diameter-mm: -2; give numbers above 0'
     assert page.locator('#save').is_disabled()
     page.fill('[data-field=diameter_mm]', '2')
     state_is(page, 'recognised')
     page.fill('#length', 'wide')
-    state_is(page, 'not usable as told')
+    state_is(page, 'not usable as described')
     assert "--sides-mm: 'wide' is no number" in page.locator('#error').inner_text()
     page.fill('#length', '')
     state_is(page, 'recognised')
@@ -154,7 +154,7 @@ def test_corners_in_perspective_are_refused_in_words_until_the_box_is_taken(look
     scale = box['width'] / SIZE[0]
     for x, y in ((50, 15), (310, 16), (352, 230), (11, 229)):
         page.mouse.click(box['x'] + scale * x, box['y'] + scale * y)
-    state_is(page, 'not usable as told')
+    state_is(page, 'not usable as described')
     words = page.locator('#error').inner_text()
     assert '--corners: form no upright rectangle: one is 42 px off' in words
     assert 'calibrate' in words
@@ -185,7 +185,7 @@ def test_an_interrupt_ends_without_a_file_and_without_a_traceback(browsed):
 def test_options_that_the_page_tells_are_refused(film, tmp_path, capsys):
     arguments = ['tray', film, '--browse', '--count', '5', '-o', str(tmp_path / 'mine.yaml')]
     assert main(arguments) == 2
-    assert '--count: is told in the browser' in capsys.readouterr().err
+    assert '--count: is given in the browser' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,10 @@ def test_without_a_command_the_help_is_printed(capsys, words):
         (['analyze', 'a'], 'analyze: no command of nanorocks; did you mean analyse?'),
         (['figure', 'dcay'], 'dcay: no command of nanorocks figure; did you mean decay?'),
         (['qqq'], 'qqq: no command of nanorocks; see nanorocks --help'),
+        (
+            ['speeds', '--rate'],
+            '--rate: no option of nanorocks speeds; see nanorocks speeds --help-all',
+        ),
         (['--vrsion'], '--vrsion: no option of nanorocks; did you mean --version?'),
         # Before anything is said to be missing.
         (

@@ -87,10 +87,10 @@ def test_info_prints_the_contents_of_a_bag(tmp_path, capsys):
     assert printed['metadata'] == {'nanorocks_ros': '9'}
     problems = [problem['what'] for problem in printed['health']]
     assert any('no camera_info' in problem for problem in problems)
-    assert any('frames are missing at 1 places' in problem for problem in problems)
+    assert any('frames are missing at 1 place,' in problem for problem in problems)
     code, out, _ = run(capsys, 'info', path)
     assert code == 0
-    assert f'{CAMERA} [sensor_msgs/msg/CompressedImage]: 15, 25 Hz, 1 gaps' in out
+    assert f'{CAMERA} [sensor_msgs/msg/CompressedImage]: 15, 25 Hz, 1 gap of' in out
 
 
 def test_info_prints_problems_and_remedies(tmp_path, capsys):

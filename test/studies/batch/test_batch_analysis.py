@@ -29,7 +29,7 @@ from nanorocks_ros.records import Quality
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, priors_in_words, with_values
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results.result_tables import read_columns
-from nanorocks_ros.studies.batch import batch_task
+from nanorocks_ros.studies.batch import bag_summary, batch_task
 from nanorocks_ros.studies.batch.batch_analysis import BagResults, BatchPlan, run_batch
 from nanorocks_ros.studies.batch.batch_store import BatchStore
 from nanorocks_ros.studies.batch.campaign_means import combined
@@ -349,7 +349,7 @@ def test_results_that_fit_no_bag_are_a_matter_of_that_recording_alone(tiny, tmp_
         )
         for bag in bags
     ]
-    assert [outcome.state for outcome in outcomes] == [batch_task.FAILED, batch_task.DONE]
+    assert [outcome.state for outcome in outcomes] == [bag_summary.FAILED, bag_summary.DONE]
     assert 'lies before 1970' in outcomes[0].reason
 
 

@@ -28,7 +28,7 @@ def test_a_diameter_in_pixels_is_enough():
     assert not section.container_known
     assert species.diameter * section.pixels_per_metre == pytest.approx(20.0)
     words = ' '.join(tray.notices)
-    for part in ('--diameter-mm', 'one layer', '--height-mm and --diameter-mm, the'):
+    for part in ('single layer', '--height-mm with --diameter-mm'):
         assert part in words
 
 

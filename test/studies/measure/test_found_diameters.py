@@ -108,7 +108,7 @@ def test_of_a_file_that_tells_all_sizes_nothing_changes(discs, tmp_path):
     ('species', 'problem'),
     [
         (('look: auto', 'look: auto'), r'2 of one look .* of \d\d\.\d px; measure a bead'),
-        (('look: auto', 'colour: red'), r'colour of some species is told'),
+        (('look: auto', 'colour: red'), r'colour of some species is given'),
         (('look: auto, diameter_mm: 5', 'look: auto'), r'2 of one look'),
         (('look: bright',), r'nanorocks tray FILM --browse'),
     ],

@@ -43,7 +43,7 @@ def test_a_size_that_is_told_is_that_of_its_species(film):
     looks = [SpeciesLook(diameter=20.0), SpeciesLook()]
     assert diameters(species_sizes(film, looks)) == pytest.approx([21.0, 14.0], abs=0.3)
     looks = [SpeciesLook(diameter=40.0), SpeciesLook()]
-    assert species_sizes(film, looks) == 'none of the discs has the 40.0 px that are told'
+    assert species_sizes(film, looks) == 'none of the discs has the 40.0 px that are given'
 
 
 def test_three_sizes_are_found():
@@ -67,7 +67,7 @@ def test_dark_and_bright_beads_are_told_apart():
 def test_one_size_for_two_species_is_refused():
     frames = draw(replace(SCENE, sizes=(9.0,)))[0]
     problem = species_sizes(frames, [SpeciesLook(), SpeciesLook()])
-    assert problem == '2 of one look are told, and discs show with diameters of 18.0 px'
+    assert problem == '2 of one look are given, and discs show with diameters of 18.0 px'
 
 
 def test_any_size_between_two_is_refused():
@@ -78,7 +78,7 @@ def test_any_size_between_two_is_refused():
 def test_more_sizes_than_species_are_refused(film):
     frames = draw(replace(SCENE, sizes=(6.0, 9.0, 13.0), count=18))[0]
     problem = species_sizes(frames, [SpeciesLook(), SpeciesLook()])
-    assert problem.startswith('2 of one look are told, and discs show with diameters of 12.0 and')
+    assert problem.startswith('2 of one look are given, and discs show with diameters of 12.0 and')
 
 
 def test_looks_that_are_told_of_some_alone_are_refused(film):

@@ -1,0 +1,1 @@
+"""The report of a batch: its sections, tables and figure."""
