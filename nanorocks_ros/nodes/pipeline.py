@@ -11,8 +11,8 @@ from nanorocks_ros.nodes.base.communication.topic_monitor import ONE_SOURCE
 from nanorocks_ros.nodes.base.epoch import Epoch
 from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.nodes.base.told_settings import default_settings
-from nanorocks_ros.nodes.pipeline_parts.frame_source import FrameSource, SourceChoice
-from nanorocks_ros.nodes.pipeline_parts.frame_stages import FrameStages
+from nanorocks_ros.nodes.frames.frame_source import FrameSource, SourceChoice
+from nanorocks_ros.nodes.frames.frame_stages import FrameStages
 from nanorocks_ros.nodes.sources.bag_source import refuse_unused_parameters, settings_of_bag
 from nanorocks_ros.nodes.workers.graph_recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes.workers.live_page_process import LivePageProcess

@@ -143,7 +143,6 @@ def _rebound(stamp_ns: int, speed: float) -> Rebound:
 
 def _collision(stamp_ns: int, speed: float, tray: Tray) -> PairCollision:
     """A bead that hits one at rest."""
-    mass = tray.species[0].mass
     return PairCollision(
         stamp_ns=stamp_ns,
         tray=1,
@@ -152,7 +151,7 @@ def _collision(stamp_ns: int, speed: float, tray: Tray) -> PairCollision:
         species=np.zeros(2, dtype=np.int32),
         radii=np.full(2, 0.5 * tray.diameter),
         radius_errors=np.full(2, 1e-6),
-        masses=np.full(2, mass),
+        masses=np.full(2, 1e-6),
         before=np.array([[speed, 0.0], [0.0, 0.0]]),
         after=np.array([[0.05 * speed, 0.0], [0.95 * speed, 0.0]]),
         before_errors=np.full(2, 0.02 * speed),

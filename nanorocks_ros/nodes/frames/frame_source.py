@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nanorocks_ros import settings as st
     from nanorocks_ros.nodes.base.epoch import Epoch
     from nanorocks_ros.nodes.base.node import NanorocksNode
-    from nanorocks_ros.nodes.pipeline_parts.frame_stages import FrameStages
+    from nanorocks_ros.nodes.frames.frame_stages import FrameStages
     from nanorocks_ros.nodes.sources.simulated_tray import TrayMoment
     from nanorocks_ros.nodes.workers.graph_recorder import GraphRecorder
     from nanorocks_ros.recordings.bag.reader import BagMessage
