@@ -116,6 +116,10 @@ class View(NamedTuple):
     voting: Voting
     evidence: float
 
+    def with_step(self, step: float) -> View:
+        """The same with another usual step at edges, [gray levels]."""
+        return self._replace(voting=self.voting._replace(step=step))
+
     def of(self, color: NDArray[np.uint8], colours: SceneColours) -> NDArray[np.uint8]:
         """The picture, (rows, columns)."""
         return colours.difference(color) if self.moves else colours.picture(color)

@@ -54,6 +54,11 @@ class KnownBeads:
         low, high = np.quantile(features[:, 3], [_KNOWN_SHARE, 1.0 - _KNOWN_SHARE]) / spreads[3]
         return cls(cKDTree(features[::every] / spreads), spreads, (float(low), float(high)))
 
+    @property
+    def colours(self) -> NDArray[np.float64]:
+        """Colours of some of these discs, (n, 3), bgr, [gray levels]."""
+        return np.asarray(self.tree.data[:, :3] * self.spreads[:3])
+
     def distances(
         self, colours: NDArray[np.float64], radii: NDArray[np.float64]
     ) -> NDArray[np.float64]:

@@ -38,9 +38,11 @@ from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, enla
 from nanorocks_ros.stages.tracking.scene.smeared_discs import smeared_discs
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
+
+    OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
 
 # Smallest share of the outline that votes, and that the edges on the circle cover.
 _LEAST_VOTES, _LEAST_SUPPORT = 0.25, 0.5
@@ -66,8 +68,10 @@ _OTHER_SIGN_SHARE = 0.4
 # A search begins where a bead is expected, and not again within this part of its radius where
 # that shows an outline with this support and step over the usual one.
 _SAME_SHARE, _SURE_SUPPORT, _SURE_STEP = 0.8, 0.7, 0.5
-# Frames in which discs are searched to learn from.
-_LEARNING_FRAMES = 8
+# Frames in which discs are searched to learn from, and their usual step.
+_LEARNING_FRAMES, _STEP_FRAMES = 8, 4
+# Of the steps of all discs this quantile is the usual one.
+_USUAL = 0.75
 
 
 class SceneModel:
@@ -120,6 +124,34 @@ class SceneModel:
         """Smallest and largest radius that is searched, [px]."""
         voting = self.views[0].voting
         return voting.smallest / self.scale, voting.largest / self.scale
+
+    @property
+    def bead_colours(self) -> NDArray[np.float64]:
+        """Colours of discs that are known to be beads, (n, 3), bgr, [gray levels]."""
+        return np.empty((0, 3)) if self._known is None else self._known.colours
+
+    def attend_to(self, frames: Sequence[NDArray[np.uint8]], own: OwnColours) -> None:
+        """Let the usual edges be those of discs of one species, where others are stronger.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        own : callable
+            Says of colours (n, 3) inside and around discs which of these are the species.
+        """
+        chosen = [enlarged(frame, self.scale) for frame in _some(frames, _STEP_FRAMES)]
+        for k, view in enumerate(self.views):
+            # With weaker edges than those of the discs of all species.
+            weaker = view.with_step(_WEAKER[1] * view.voting.step)
+            steps = []
+            for frame in chosen:
+                outlines = self._outlines(frame, weaker)
+                good = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
+                steps.append(good.steps[own(*colours_of(frame, good.discs))])
+            own_steps = np.concatenate(steps)
+            if len(own_steps) >= _LEAST_MOVING:
+                usual = weaker.voting.step * float(np.quantile(own_steps, _USUAL))
+                self.views[k] = view.with_step(min(usual, view.voting.step))
 
     def candidates(
         self, color: NDArray[np.uint8], hints: NDArray[np.float64] | None = None
@@ -206,7 +238,9 @@ class SceneModel:
         return join_outlines([sharp, smeared.chosen(smeared.steps >= _LEAST_STEP)])
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
-        chosen = [enlarged(frame, self.scale) for frame in frames[:: max(1, len(frames) // 4)]]
+        chosen = [
+            enlarged(frame, self.scale) for frame in frames[:: max(1, len(frames) // _STEP_FRAMES)]
+        ]
         self.views = self._plain_views(chosen)
         if self.colours.knows_background:
             self.views.append(self._view(chosen, moves=True, sign=1))
@@ -272,13 +306,13 @@ class SceneModel:
         for part in _WEAKER:
             # Hands, rails and skirting boards may have stronger edges than the beads.
             step = max(part * voting.step, _LEAST_LEVELS)
-            found = view._replace(voting=voting._replace(step=step))
+            found = view._replace(voting=voting).with_step(step)
             outlines = join_outlines([self._outlines(frame, found) for frame in frames])
             if len(outlines.steps):
                 break
         else:
             return View(moves, voting, 0.0)
-        usual = float(np.quantile(outlines.steps, 0.75))
+        usual = float(np.quantile(outlines.steps, _USUAL))
         evidence = float((outlines.support**2 * outlines.steps).sum())
         return View(moves, voting._replace(step=step * usual), evidence)
 
