@@ -51,7 +51,7 @@ def apart(outlines: Outlines, radii: float = 1.0) -> NDArray[np.bool_]:
         Smallest distance of two centres, in radii.
     """
     discs = np.ascontiguousarray(outlines.discs)
-    order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
+    order = np.argsort(-outlines.quality, kind='stable')
     keep = np.ones(len(discs), dtype=bool)
     leave_out_near(discs, order, radii, keep)
     return keep

@@ -55,6 +55,11 @@ class Outlines(NamedTuple):
     support: NDArray[np.float64]
     steps: NDArray[np.float64]
 
+    @property
+    def quality(self) -> NDArray[np.float64]:
+        """How well each circle shows, 0 to 1, (n,); steps are over the usual one."""
+        return np.asarray(self.support * np.minimum(self.steps, 1.0))
+
     def chosen(self, rows: NDArray[np.bool_]) -> Outlines:
         """Some of the circles."""
         return Outlines(*(values[rows] for values in self))

@@ -173,7 +173,7 @@ class SceneDetector:
             outlines.radius_errors,
             outlines.support,
             # As many as told may lie aside; of any number these are none.
-            outlines.support * np.minimum(outlines.steps, 1.0) - aside,
+            outlines.quality - aside,
         ).chosen(alike)
         return discs.chosen(np.argsort(-discs.score, kind='stable'))
 
