@@ -201,9 +201,6 @@ SCENES = {
     'clear, green floor, rail, holes': DrawnScene(
         floor=(60, 120, 50), colours=((30, 60, 25),), rim=0.6, highlight=90, clutter=True
     ),
-    'clear, bright on dark stains': DrawnScene(
-        floor=(60, 62, 60), colours=((190, 195, 195),), rim=0.6, highlight=90, texture=12
-    ),
     'dark shadows': DrawnScene(floor=(170, 170, 165), colours=((70, 70, 120),), shadow=0.5),
     'stained floor, rail, holes': DrawnScene(
         floor=(100, 140, 170), colours=((60, 60, 60),), texture=12, clutter=True

@@ -33,7 +33,7 @@ _LEAST_NOISES = 4.0
 _SAME_SHARE, _SURE_SUPPORT, _SURE_STEP = 0.8, 0.7, 0.5
 # Shadows have wide edges, which vote for more than an outline, and may lie over a clear bead: so
 # many places beside them, so many radii away, are searched, too.
-_SOFT_VOTES, _BESIDE, _BESIDE_RADII = 1.2, 8, 0.7
+_SOFT_VOTES, _BESIDE, _BESIDE_RADII, _WHOLE_SUPPORT = 1.2, 8, 0.7, 0.85
 
 
 def search_outlines(
@@ -64,16 +64,18 @@ def search_outlines(
     starts, votes = centres[:, :3], centres[:, 3]
     at_starts = fit_outlines(picture, starts, voting)
     beside = _beside(starts[(votes > _SOFT_VOTES) & ~are_sure(at_starts, voting.step)])
-    outlines = join_outlines([at_hints, at_starts, fit_outlines(picture, beside, voting)])
+    at_beside = fit_outlines(picture, beside, voting)
+    # A smeared bead has wide edges, too, but no whole outline.
+    whole = at_beside.support >= _WHOLE_SUPPORT
+    outlines = join_outlines([at_hints, at_starts, at_beside.chosen(whole)])
     steps = outlines.steps / voting.step
     good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
     good &= outlines.steps >= max(LEAST_LEVELS, _LEAST_NOISES * voting.noise)
     sharp = outlines._replace(steps=steps).chosen(good)
     if moving is None:
         return sharp
-    smeared = smeared_discs(
-        picture, moving, np.concatenate([expected, starts, beside])[~good], voting
-    )
+    places = np.concatenate([expected, starts, beside[whole]])
+    smeared = smeared_discs(picture, moving, places[~good], voting)
     return join_outlines([sharp, smeared.chosen(smeared.steps >= _LEAST_STEP)])
 
 
