@@ -1,4 +1,7 @@
-"""Discs that show in a picture: places that edges vote for, and the outlines there."""
+"""Discs that show in a picture: places that edges vote for, and the outlines there.
+
+Tested by ``test/stages/tracking/scene/test_scene_model.py``.
+"""
 
 from __future__ import annotations
 
