@@ -14,7 +14,9 @@ from nanorocks_ros.stages.tracking.scene.bead_looks import (
     View,
     join_candidates,
 )
-from nanorocks_ros.stages.tracking.scene.disc_measures import (
+from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
+from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, AtRest, KnownBeads
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import (
     apart,
     colours_of,
     join_outlines,
@@ -22,10 +24,8 @@ from nanorocks_ros.stages.tracking.scene.disc_measures import (
     reduced,
     staying,
 )
-from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
-from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, AtRest, KnownBeads
-from nanorocks_ros.stages.tracking.scene.open_outlines import ends_of_others
-from nanorocks_ros.stages.tracking.scene.outline_search import are_sure, search_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.open_outlines import ends_of_others
+from nanorocks_ros.stages.tracking.scene.outlines.outline_search import are_sure, search_outlines
 from nanorocks_ros.stages.tracking.scene.roamed_region import (
     MOVING_SHARE,
     RoamedRegion,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+    from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
     OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
 

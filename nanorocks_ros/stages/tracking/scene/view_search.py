@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.stages.tracking.scene.bead_looks import View
-from nanorocks_ros.stages.tracking.scene.disc_measures import join_outlines
-from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
-from nanorocks_ros.stages.tracking.scene.outline_search import LEAST_LEVELS, search_outlines
-from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import join_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
+from nanorocks_ros.stages.tracking.scene.outlines.outline_search import (
+    LEAST_LEVELS,
+    search_outlines,
+)
+from nanorocks_ros.stages.tracking.scene.outlines.radius_search import search_radii, usual_step
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

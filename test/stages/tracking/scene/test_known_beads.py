@@ -7,7 +7,7 @@ import pytest
 
 from nanorocks_ros.stages.tracking.scene.bead_looks import Candidates
 from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, AtRest, KnownBeads
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
 ORANGE = np.array([70.0, 120.0, 220.0])
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.outline_kernels import (
+from nanorocks_ros.stages.tracking.scene.outlines.outline_kernels import (
     RAYS,
     RESULTS,
     Search,
@@ -18,7 +18,7 @@ from nanorocks_ros.stages.tracking.scene.outline_kernels import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
+    from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
 
 # Part of the radius on either side of the outline that is searched for edges, by iteration.
 _REACHES = 0.5, 0.25

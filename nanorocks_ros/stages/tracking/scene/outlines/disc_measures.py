@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.stages.tracking.scene.disc_kernels import leave_out_near, ring_medians
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import leave_out_near, ring_medians
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.stages.tracking.scene.disc_measures import join_outlines
-from nanorocks_ros.stages.tracking.scene.edge_votes import centres_of_all_sizes
-from nanorocks_ros.stages.tracking.scene.outline_fits import fit_outlines
-from nanorocks_ros.stages.tracking.scene.smeared_discs import smeared_discs
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import join_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import centres_of_all_sizes
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import fit_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.smeared_discs import smeared_discs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
-    from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+    from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
+    from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
 LEAST_LEVELS = 4.0
 """Smallest step at the edge of a bead, [gray levels]."""
