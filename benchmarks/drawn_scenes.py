@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+# Places that are tried for a bead before the picture counts as full.
+_TRIES = 20_000
+
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnScene:
@@ -91,17 +94,31 @@ def _start(scene, rng):
     radii = rng.uniform(*scene.radii, scene.count)
     if scene.sizes:
         radii = np.resize(scene.sizes, scene.count).astype(float)
+    if scene.count and 2.0 * (radii.max() + 1.0) >= min(columns, rows):
+        raise _do_not_fit(scene, 0)
     places = np.empty((0, 2))
+    tries = 0
     while len(places) < scene.count:
         radius = radii[len(places)]
+        tries += 1
+        if tries > _TRIES:
+            raise _do_not_fit(scene, len(places))
         place = rng.uniform(radius + 1, [columns - radius - 1, rows - radius - 1])
         apart = np.hypot(*(places - place).T)
         if (apart > radii[: len(places)] + radius + 1.0).all():
             places = np.vstack([places, place])
+            tries = 0
     turns = rng.uniform(0.0, 2.0 * math.pi, scene.count)
     speeds = scene.speed * rng.rayleigh(0.8, scene.count)
     speeds[rng.random(scene.count) < scene.at_rest] = 0.0
     return places, speeds[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1), radii
+
+
+def _do_not_fit(scene, count):
+    return SystemExit(
+        f'drawn scene: {count} of {scene.count} beads fit in {scene.size[0]} x {scene.size[1]} '
+        'px; draw fewer or smaller ones, or a larger picture'
+    )
 
 
 def _move(places, velocities, radii, scene):
@@ -175,6 +192,15 @@ SCENES = {
         shadow=0.2,
     ),
     'clear': DrawnScene(floor=(140, 145, 140), colours=((70, 75, 75),), rim=0.6, highlight=90),
+    'clear, stained floor': DrawnScene(
+        floor=(140, 145, 140), colours=((70, 75, 75),), rim=0.6, highlight=90, texture=12
+    ),
+    'clear, shadows': DrawnScene(
+        floor=(140, 145, 140), colours=((70, 75, 75),), rim=0.6, highlight=90, shadow=0.3
+    ),
+    'clear, green floor, rail, holes': DrawnScene(
+        floor=(60, 120, 50), colours=((30, 60, 25),), rim=0.6, highlight=90, clutter=True
+    ),
     'dark shadows': DrawnScene(floor=(170, 170, 165), colours=((70, 70, 120),), shadow=0.5),
     'stained floor, rail, holes': DrawnScene(
         floor=(100, 140, 170), colours=((60, 60, 60),), texture=12, clutter=True

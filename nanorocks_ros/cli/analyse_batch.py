@@ -48,6 +48,15 @@ def is_batch(options: argparse.Namespace) -> bool:
     return is_pattern(options.bags[0]) or is_collection(Path(options.bags[0]))
 
 
+def _check_diameters(settings: PipelineSettings) -> None:
+    """Refuse trays whose diameters are not told: each film would have its own."""
+    from nanorocks_ros.experiment.trays import load_trays
+    from nanorocks_ros.experiment.unknown_diameters import unknown_diameters
+
+    if unknown_diameters(settings.trays_file):
+        load_trays(settings.trays_file)
+
+
 def run_many(options: argparse.Namespace) -> int:
     """Analyse all recordings, combine and report them, and return the exit code."""
     from nanorocks_ros.cli.flags import settings_from, told_settings
@@ -60,6 +69,7 @@ def run_many(options: argparse.Namespace) -> int:
     settings = settings_from(options, PipelineSettings(), options.parameters)
     if options.no_output or not options.output:
         raise ConfigurationError('--output', 'is required for many recordings', 'pass -o RESULTS')
+    _check_diameters(settings)
     workers = Workers(processes=options.workers, scheduler=options.scheduler)
     folder = Path(options.output)
     search = find_bags(options.bags)

@@ -22,7 +22,7 @@ from nanorocks_ros.experiment.materials import (
 from nanorocks_ros.experiment.tray_cells import Polygon
 from nanorocks_ros.experiment.tray_cells import Species as Species
 from nanorocks_ros.experiment.tray_cells import Tray as Tray
-from nanorocks_ros.experiment.unknown_diameters import DIAMETER, FINDING_DIAMETERS
+from nanorocks_ros.experiment.unknown_diameters import DIAMETER, finding_diameters
 from nanorocks_ros.experiment.yaml_lines import (
     YamlLines,
     file_content,
@@ -259,7 +259,7 @@ class _TrayFile(YamlLines):
 
     def _diameters(self, node: yaml.Node, told: yaml.Node | None) -> list[float]:
         if told is None or (isinstance(told, yaml.ScalarNode) and told.value == AUTO):
-            raise self.error(node, f'lacks {DIAMETER}', f'add it; {FINDING_DIAMETERS}')
+            raise self.error(node, f'lacks {DIAMETER}', f'add it; {finding_diameters(self.file)}')
         diameters = self._lengths(told)
         if len(diameters) not in (1, 2) or diameters[0] > diameters[-1]:
             raise self.error(told, f'diameter {diameters}', 'give one, or the lower and upper')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING, NamedTuple
 
 import yaml
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 
 DIAMETER = 'diameter_mm'
 """Name of the entry."""
-FINDING_DIAMETERS = 'with "look: auto", `nanorocks track FILM` finds it'
-"""How a diameter comes to be known, for errors."""
 
 
 class UnknownDiameter(NamedTuple):
@@ -47,6 +46,14 @@ def unknown_diameters(trays_file: str | Path) -> tuple[UnknownDiameter, ...]:
         When the file cannot be read. Of entries that are wrong `load_trays` tells.
     """
     return tuple(_missing(trays_file)) if str(trays_file) else ()
+
+
+def finding_diameters(trays_file: str) -> str:
+    """How the diameters of a trays file come to be known, for errors."""
+    return (
+        f'with "look: auto", `nanorocks track FILM --trays-file {shlex.quote(trays_file)}` finds '
+        'it and prints the entry'
+    )
 
 
 def with_diameters(trays_file: str | Path, diameters: Mapping[UnknownDiameter, float]) -> str:

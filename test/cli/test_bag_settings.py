@@ -158,6 +158,17 @@ def test_a_batch_analyses_each_bag_by_what_it_says(tray_3, own_tray, tmp_path, c
     assert sorted(batch['trays']) == ['2', '3']
 
 
+def test_a_batch_refuses_diameters_that_are_not_told_once(tray_3, own_tray, tmp_path, capsys):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(OWN_TRAY.replace('diameter_mm: 2', 'look: auto, diameter_mm: auto'))
+    results = tmp_path / 'results'
+    code, _, error = run(capsys, 'analyse', tray_3, own_tray, '-o', results, '--trays-file', path)
+    assert code == 2
+    assert error.count('\n') == 1
+    assert f'`nanorocks track FILM --trays-file {path}` finds it' in error
+    assert not results.exists()
+
+
 def test_a_tray_with_other_beads_is_left_out_of_the_means_of_a_batch(own_tray, tmp_path, capsys):
     path = tmp_path / 'mine.yaml'
     path.write_text(OWN_TRAY.replace('count: 12', 'count: 9'))

@@ -31,7 +31,18 @@ export class Marks {
     this.clicked = null;
   }
 
-  /** What is told of the corners: all four as they were clicked, until the box is changed. */
+  /** All four corners of a container that may be seen at an angle. */
+  setCorners(corners) {
+    this.setBox(boxAround(corners));
+    this.clicked = corners;
+  }
+
+  /** The corners that are drawn, and can be dragged. */
+  get shown() {
+    return this.clicked ?? this.corners;
+  }
+
+  /** What is told of the corners: all four as they were clicked or dragged, until a side of the box is told. */
   told() {
     if (!this.cornersTold) return [];
     return this.clicked ? this.clicked.flat() : boxAround(this.corners);
@@ -46,7 +57,7 @@ export class Marks {
 
   /** What is under a pointer; `reach` is a pixel of the screen in pixels of the film. */
   under(place, species, reach, beads) {
-    for (const [k, corner] of this.corners.entries()) {
+    for (const [k, corner] of this.shown.entries()) {
       if (distance(corner, place) < REACH_PX * reach) return { corner: k };
     }
     if (!beads) return null;
@@ -64,8 +75,7 @@ export class Marks {
     if (!this.clicking) return false;
     this.clicking.push(place.map((value) => Math.round(value)));
     if (this.clicking.length === 4) {
-      this.setBox(boxAround(this.clicking));
-      this.clicked = this.clicking;
+      this.setCorners(this.clicking);
       this.clicking = null;
       this.changed();
     }
@@ -75,7 +85,9 @@ export class Marks {
   drag(place, species) {
     const { corner, edge, circle, from } = this.held;
     const inside = [Math.min(Math.max(place[0], 0), this.width), Math.min(Math.max(place[1], 0), this.height)];
-    if (corner !== undefined) {
+    if (corner !== undefined && this.clicked) {
+      this.setCorners(this.clicked.with(corner, inside.map((value) => Math.round(value))));
+    } else if (corner !== undefined) {
       // The container is upright in the picture: the corner opposite stays, the others follow.
       const moved = inside.map((value) => Math.round(value));
       const opposite = this.corners[(corner + 2) % 4];
@@ -98,7 +110,7 @@ export class Marks {
     brush.strokeStyle = '#ffc800';
     brush.fillStyle = '#ffc800';
     brush.setLineDash(this.cornersTold ? [] : [6 * scale, 5 * scale]);
-    const outline = this.clicked ?? this.corners;
+    const outline = this.shown;
     brush.beginPath();
     for (const [x, y] of outline) brush.lineTo(x, y);
     brush.closePath();

@@ -20,7 +20,7 @@ from nanorocks_ros.stages.tracking.recognition_kernels import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.experiment.trays import Species, Tray
     from nanorocks_ros.records import Tracks
 
 # A disc at rest stays within this part of its radius, or this many errors of its position.
@@ -68,6 +68,9 @@ class SpeciesCounts:
         NaN: too few displacements above the errors of the positions.
     learnt : bool
         Whether the look of the beads is learnt from the film.
+    diameter_ratio : float
+        Diameter of the discs, median over these, over the nearest that is told;
+        NaN: nothing is seen.
     """
 
     tray: int
@@ -87,6 +90,7 @@ class SpeciesCounts:
     wrong_scale: float
     spread_exponent: float = math.nan
     learnt: bool = False
+    diameter_ratio: float = math.nan
 
 
 class RecognitionCounter:
@@ -189,6 +193,7 @@ class RecognitionCounter:
             wrong_scale=self._wrong_scale / frames,
             spread_exponent=_spread_exponent(self._displacements[k]),
             learnt=species.appearance is not None,
+            diameter_ratio=_diameter_ratio(track_sums, species),
         )
 
 
@@ -217,6 +222,17 @@ def _median_length(track_sums: NDArray[np.float64]) -> float:
     if lengths.size == 0:
         return math.nan
     return float(lengths[np.searchsorted(np.cumsum(lengths), 0.5 * lengths.sum())])
+
+
+def _diameter_ratio(track_sums: NDArray[np.float64], species: Species) -> float:
+    """Diameter of the discs over the nearest that is told; each track counts by its images."""
+    if len(track_sums) == 0:
+        return math.nan
+    means = 2.0 * track_sums[:, 5] / track_sums[:, 0]
+    order = np.argsort(means)
+    images = np.cumsum(track_sums[order, 0])
+    diameter = float(means[order][np.searchsorted(images, 0.5 * images[-1])])
+    return diameter / min(max(diameter, species.diameter_low), species.diameter_high)
 
 
 def _share_at_rest(track_sums: NDArray[np.float64], least_images: float) -> float:

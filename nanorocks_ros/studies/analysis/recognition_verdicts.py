@@ -34,6 +34,9 @@ _MAX_AT_REST, _MAX_OVERLAPPING, _MAX_ELONGATED = 0.5, 0.3, 0.4
 # Share of the speeds near the limit: flagged, and not usable.
 _NEAR_LIMIT, _AT_LIMIT = 0.01, 0.05
 _MAX_WRONG_SCALE = 0.5
+# Difference of the diameter of the discs from the one told, as a part: flagged, and not usable.
+# Blur and light move the outlines of beads of a few pixels by a tenth.
+_OTHER_SIZE, _WRONG_SIZE = 0.12, 0.18
 # Power of the time below which displacements are those of diffusion, not of flight.
 _FREE_FLIGHT = 1.35
 # Shorter tracks, where any number may be, are not those of beads; from this many frames on.
@@ -81,11 +84,18 @@ class Verdict:
     usable: bool
     flags: tuple[FlagWords, ...] = ()
 
+    @property
+    def word(self) -> str:
+        """`usable`, `usable with care` or `NOT USABLE`, with the names of the flags."""
+        names = ', '.join(flag.name for flag in self.flags)
+        if not self.usable:
+            return f'NOT USABLE ({names})'
+        return f'usable with care ({names})' if names else 'usable'
+
     def lines(self) -> list[str]:
         """The verdict, and a line for each flag."""
-        word = 'usable' if self.usable else 'NOT USABLE'
         return [
-            f'{self.text}: {word}',
+            f'{self.text}: {self.word}',
             *(f'{flag.name}: {flag.text}; {flag.remedy}' for flag in self.flags),
         ]
 
@@ -256,8 +266,9 @@ def _shape_faults(counts: SpeciesCounts, scenery: Scenery) -> list[_Fault]:
 
 
 def _scale(counts: SpeciesCounts) -> list[_Fault]:
-    """Speeds at the limit of the links, and a scale that is at odds with the picture."""
+    """Speeds at the limit of the links; a scale and sizes that are at odds with the picture."""
     limit = _MM * counts.max_speed
+    other = counts.diameter_ratio - 1.0
     wrong = FLAGS[Quality.WRONG_SCALE]
     return [
         _Fault(
@@ -279,6 +290,16 @@ def _scale(counts: SpeciesCounts) -> list[_Fault]:
                 f'time to the power {counts.spread_exponent:.1f}, 2 in free flight): a mean speed '
                 'depends on the lag',
                 'film at a higher rate, or compare diffusion instead of speeds',
+            ),
+        ),
+        _Fault(
+            abs(other) > _OTHER_SIZE,
+            abs(other) > _WRONG_SIZE,
+            FlagWords(
+                'other_size',
+                f'the discs are at least {_PERCENT * abs(other):.0f} % '
+                f'{"larger" if other > 0.0 else "smaller"} than the diameter that is told',
+                f'{_SEE}; correct the diameter, or have it found: `auto`',
             ),
         ),
         _Fault(

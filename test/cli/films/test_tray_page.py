@@ -145,7 +145,7 @@ def test_the_corners_are_clicked_and_forgotten(look, browsed):
     assert float(page.locator('#bottom').input_value()) == SIZE[1]
 
 
-def test_corners_in_perspective_are_refused_in_words_until_the_box_is_taken(look, browsed):
+def test_corners_in_perspective_are_refused_in_words_until_sides_are_told(look, browsed):
     _, url, _ = browsed
     page = look(url)
     state_is(page, 'recognised')
@@ -159,7 +159,23 @@ def test_corners_in_perspective_are_refused_in_words_until_the_box_is_taken(look
     assert '--corners: form no upright rectangle: one is 42 px off' in words
     assert 'calibrate' in words
     assert page.locator('#save').is_disabled()
-    drag(page, (11, 230), (12, 228))
+    # Each corner is dragged where it is drawn.
+    drag(page, (310, 16), (338, 20))
+    drag(page, (50, 15), (24, 18))
+    page.fill('#length', '35')
+    page.fill('#width', '23')
+    corners_told = "document.querySelector('#text').textContent.includes('corners_px')"
+    page.wait_for_function(f'() => {corners_told}')
+    state_is(page, 'recognised')
+    corners = film_section(page.locator('#text').text_content()).corners_px
+    for corner, place in zip(corners, ((24, 18), (338, 20), (352, 230), (11, 229)), strict=True):
+        assert corner == pytest.approx(place, abs=1)
+    # A side that is told makes the container upright again.
+    page.fill('#length', '')
+    page.fill('#width', '')
+    page.fill('#bottom', '232')
+    page.locator('#top').focus()
+    page.wait_for_function(f'() => !{corners_told}')
     state_is(page, 'recognised')
     assert page.locator('#save').is_enabled()
 

@@ -60,6 +60,8 @@ def test_beads_that_are_nearly_always_seen_are_usable():
         ({'wrong_scale': 0.9}, 'wrong_scale', False),
         ({'track_length': 2.0}, 'short_tracks', False),
         ({'spread_exponent': 1.0}, 'diffusive', True),
+        ({'diameter_ratio': 1.14}, 'other_size', True),
+        ({'diameter_ratio': 0.78}, 'other_size', False),
     ],
 )
 def test_each_fault_has_a_flag_and_a_remedy(changes, flag, usable):
@@ -67,6 +69,14 @@ def test_each_fault_has_a_flag_and_a_remedy(changes, flag, usable):
     assert names(verdict) == [flag]
     assert verdict.usable is usable
     assert all(row.text and row.remedy for row in verdict.flags)
+
+
+def test_the_verdict_names_its_flags():
+    fast = replace(GOOD, near_limit=0.03)
+    assert recognition_verdict(fast).lines()[0].endswith(': usable with care (speed_limit)')
+    other = replace(fast, diameter_ratio=0.7)
+    line = recognition_verdict(other).lines()[0]
+    assert line.endswith(': NOT USABLE (other_size, speed_limit)')
 
 
 def test_three_times_too_many_is_said_as_a_share():

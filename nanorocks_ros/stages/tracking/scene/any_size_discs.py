@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nanorocks_ros.stages.tracking.scene.bead_looks import View, join_candidates
-from nanorocks_ros.stages.tracking.scene.disc_measures import (
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import (
     colours_of,
     join_outlines,
     marked_shares,
     staying,
 )
-from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
-from nanorocks_ros.stages.tracking.scene.radius_search import (
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
+from nanorocks_ros.stages.tracking.scene.outlines.radius_search import (
     outlines_in,
     trial_ranges,
     usual_step,

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.disc_measures import join_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import join_outlines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
-    from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+    from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
+    from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
     from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours
 
 # Brightness of a shaded bead over that of its colour in even light.
@@ -115,6 +115,10 @@ class View(NamedTuple):
     moves: bool
     voting: Voting
     evidence: float
+
+    def with_step(self, step: float) -> View:
+        """The same with another usual step at edges, [gray levels]."""
+        return self._replace(voting=self.voting._replace(step=step))
 
     def of(self, color: NDArray[np.uint8], colours: SceneColours) -> NDArray[np.uint8]:
         """The picture, (rows, columns)."""

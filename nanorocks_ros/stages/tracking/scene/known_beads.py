@@ -6,13 +6,15 @@ Tested by ``test/stages/tracking/scene/test_known_beads.py``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from nanorocks_ros.stages.tracking.scene.bead_looks import Candidates
 
 ALIKE = 3.0
 """Distance of a disc to a known bead up to which it looks alike, in spreads of these."""
@@ -23,6 +25,9 @@ _LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
 _MOST_SAMPLES = 400
 # Of so many known beads two are alike.
 _MANY = 6
+# The outline of a disc at rest has at least this part of the quality of those that move, of which
+# so many are worse. Less moves of it than this part of what usually does: a bead may pass by.
+_AT_REST_SHARE, _USUALLY_WORST, _LESS_MOVING = 0.6, 0.05, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,11 @@ class KnownBeads:
         low, high = np.quantile(features[:, 3], [_KNOWN_SHARE, 1.0 - _KNOWN_SHARE]) / spreads[3]
         return cls(cKDTree(features[::every] / spreads), spreads, (float(low), float(high)))
 
+    @property
+    def colours(self) -> NDArray[np.float64]:
+        """Colours of some of these discs, (n, 3), bgr, [gray levels]."""
+        return np.asarray(self.tree.data[:, :3] * self.spreads[:3])
+
     def distances(
         self, colours: NDArray[np.float64], radii: NDArray[np.float64]
     ) -> NDArray[np.float64]:
@@ -69,3 +79,30 @@ class KnownBeads:
         sizes = np.log(radii) / self.spreads[3]
         low, high = self.sizes
         return np.asarray((sizes > low - ALIKE) & (sizes < high + ALIKE))
+
+
+class AtRest(NamedTuple):
+    """What is asked of discs at rest: a stain may look like a clear bead.
+
+    Parameters
+    ----------
+    moving : float
+        At rest are those of which less differs from the background.
+    quality : float
+        Of their outlines, at least.
+    """
+
+    moving: float = 0.0
+    quality: float = 0.0
+
+    @classmethod
+    def beside(cls, moved: Candidates) -> AtRest:
+        """What is asked beside beads that move."""
+        usually_worst = float(np.quantile(moved.outlines.quality, _USUALLY_WORST))
+        usual = float(np.median(moved.moving))
+        return cls(_LESS_MOVING * usual, _AT_REST_SHARE * usually_worst)
+
+    def allows(self, discs: Candidates) -> NDArray[np.bool_]:
+        """Which discs move, or show well enough."""
+        rests = discs.moving < self.moving
+        return np.asarray(~rests | (discs.outlines.quality >= self.quality))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.disc_measures import marked_shares
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import marked_shares
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

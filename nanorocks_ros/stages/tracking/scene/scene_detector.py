@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,8 +13,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nanorocks_ros.stages.tracking.detection.bead_detector import Detections
-from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook, shaded_distances
+from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel, scene_model
+from nanorocks_ros.stages.tracking.scene.species_colours import SpeciesColours
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -77,6 +79,7 @@ class SceneDetector:
         self._scale = pixels_per_metre
         self._looks = [_look(tray, species, pixels_per_metre) for species in tray.species]
         self._groups = _alike(self._looks)
+        self._colours = SpeciesColours(self._looks)
         self._models: list[SceneModel] = []
         self._kept: list[NDArray[np.uint8]] = []
         self._every = 1
@@ -91,7 +94,7 @@ class SceneDetector:
         ----------
         frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
         """
-        self._models = [scene_model(frames, group.look) for group in self._groups]
+        self._learn_from(frames)
         # Nothing is to be learnt any more.
         self._learnt_at = -1
 
@@ -139,8 +142,15 @@ class SceneDetector:
                 del self._kept[1::2]
                 self._every *= 2
         if self._frames >= _GROWTH * self._learnt_at or not self._models:
-            self._models = [scene_model(self._kept, group.look) for group in self._groups]
+            self._learn_from(self._kept)
             self._learnt_at = max(self._frames, 1)
+
+    def _learn_from(self, frames: Sequence[NDArray[np.uint8]]) -> None:
+        self._models = [scene_model(frames, group.look) for group in self._groups]
+        self._colours.learn(np.concatenate([model.bead_colours for model in self._models]))
+        if len(self._models) > 1:
+            for group, model in zip(self._groups, self._models, strict=True):
+                model.attend_to(frames, partial(self._colours.of, min(group.limits)))
 
     def _of_species(
         self,
@@ -151,11 +161,7 @@ class SceneDetector:
     ) -> _RankedDiscs:
         """Discs that look like beads of a species, of radii within its limits; the best first."""
         outlines = candidates.outlines
-        distances = self._colour_distances(candidates.colours)
-        # Nearer to the colour that is told than what is around it.
-        nearer = distances[:, k] <= self._colour_distances(candidates.around)[:, k]
-        # Equal where colours are not told.
-        alike = alike & nearer & (distances[:, k] <= distances.min(axis=1))
+        alike = alike & self._colours.of(k, candidates.colours, candidates.around)
         alike &= (outlines.discs[:, 2] >= limits[0]) & (outlines.discs[:, 2] < limits[1])
         # Where the film is not known to its end, they may move yet.
         aside = candidates.aside & (self._learnt_at < 0)
@@ -167,17 +173,9 @@ class SceneDetector:
             outlines.radius_errors,
             outlines.support,
             # As many as told may lie aside; of any number these are none.
-            outlines.support * np.minimum(outlines.steps, 1.0) - aside,
+            outlines.quality - aside,
         ).chosen(alike)
         return discs.chosen(np.argsort(-discs.score, kind='stable'))
-
-    def _colour_distances(self, colours: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of each colour to that of each species; 0 where none is told, (n, species)."""
-        distances = np.zeros((len(colours), len(self._looks)))
-        for k, look in enumerate(self._looks):
-            if look.colour is not None:
-                distances[:, k] = shaded_distances(colours, look.colour)
-        return distances
 
     def _is_allowed(self, discs: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Which centres lie inside, and on no mask."""

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nanorocks_ros.stages.tracking.scene.bead_looks import (
     BeadLook,
@@ -15,7 +14,9 @@ from nanorocks_ros.stages.tracking.scene.bead_looks import (
     View,
     join_candidates,
 )
-from nanorocks_ros.stages.tracking.scene.disc_measures import (
+from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
+from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, AtRest, KnownBeads
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import (
     apart,
     colours_of,
     join_outlines,
@@ -23,27 +24,26 @@ from nanorocks_ros.stages.tracking.scene.disc_measures import (
     reduced,
     staying,
 )
-from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, centres_of_all_sizes
-from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
-from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, KnownBeads
-from nanorocks_ros.stages.tracking.scene.open_outlines import ends_of_others
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
-from nanorocks_ros.stages.tracking.scene.radius_search import search_radii, usual_step
+from nanorocks_ros.stages.tracking.scene.outlines.open_outlines import ends_of_others
+from nanorocks_ros.stages.tracking.scene.outlines.outline_search import are_sure, search_outlines
 from nanorocks_ros.stages.tracking.scene.roamed_region import (
     MOVING_SHARE,
     RoamedRegion,
     roamed_region,
 )
 from nanorocks_ros.stages.tracking.scene.scene_picture import SceneColours, enlarged, scene_colours
-from nanorocks_ros.stages.tracking.scene.smeared_discs import smeared_discs
+from nanorocks_ros.stages.tracking.scene.view_search import USUAL, WEAKER, ViewSearch
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-# Smallest share of the outline that votes, and that the edges on the circle cover.
-_LEAST_VOTES, _LEAST_SUPPORT = 0.25, 0.5
+    from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
+
+    OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
+
+# Share of the outline of a disc to learn from that has edges.
 _GOOD_SUPPORT = 0.7
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
@@ -51,23 +51,12 @@ _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
 _FEW_MOVING, _MORE_FRAMES = 8, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
-# A step is that of a bead above this part of the usual one: those of shadows are softer.
-_LEAST_STEP = 0.35
-# Parts of the usual step of all edges that are tried for that of beads, until discs show.
-_WEAKER = 1.0, 0.5, 0.25
-# And above so many gray levels, and times the noise.
-_LEAST_LEVELS, _LEAST_NOISES = 4.0, 4.0
 # Distance to a known bead up to which a moving disc looks alike, in spreads.
 _ALIKE_MOVING = 6.0
 # Beads below this radius are enlarged, [px].
 _LEAST_RADIUS_PX = 6.5
-# Discs of the other brightness count when they are at least this part.
-_OTHER_SIGN_SHARE = 0.4
-# A search begins where a bead is expected, and not again within this part of its radius where
-# that shows an outline with this support and step over the usual one.
-_SAME_SHARE, _SURE_SUPPORT, _SURE_STEP = 0.8, 0.7, 0.5
-# Frames in which discs are searched to learn from.
-_LEARNING_FRAMES = 8
+# Frames in which discs are searched to learn from, and their usual step.
+_LEARNING_FRAMES, _STEP_FRAMES = 8, 4
 
 
 class SceneModel:
@@ -103,6 +92,7 @@ class SceneModel:
         self.shadows: CastShadows | None = None
         self._known: KnownBeads | None = None
         self._roamed: RoamedRegion | None = None
+        self._at_rest = AtRest()
         self._learn(_some(frames, _LEARNING_FRAMES))
         if self.colours.knows_background and len(self._moved) < _FEW_MOVING:
             # Of a single bead each frame shows but one.
@@ -121,6 +111,34 @@ class SceneModel:
         voting = self.views[0].voting
         return voting.smallest / self.scale, voting.largest / self.scale
 
+    @property
+    def bead_colours(self) -> NDArray[np.float64]:
+        """Colours of discs that are known to be beads, (n, 3), bgr, [gray levels]."""
+        return np.empty((0, 3)) if self._known is None else self._known.colours
+
+    def attend_to(self, frames: Sequence[NDArray[np.uint8]], own: OwnColours) -> None:
+        """Let the usual edges be those of discs of one species, where others are stronger.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        own : callable
+            Says of colours (n, 3) inside and around discs which of these are the species.
+        """
+        chosen = [enlarged(frame, self.scale) for frame in _some(frames, _STEP_FRAMES)]
+        for k, view in enumerate(self.views):
+            # With weaker edges than those of the discs of all species.
+            weaker = view.with_step(WEAKER[1] * view.voting.step)
+            steps = []
+            for frame in chosen:
+                outlines = self._outlines(frame, weaker)
+                good = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
+                steps.append(good.steps[own(*colours_of(frame, good.discs))])
+            own_steps = np.concatenate(steps)
+            if len(own_steps) >= _LEAST_MOVING:
+                usual = weaker.voting.step * float(np.quantile(own_steps, USUAL))
+                self.views[k] = view.with_step(min(usual, view.voting.step))
+
     def candidates(
         self, color: NDArray[np.uint8], hints: NDArray[np.float64] | None = None
     ) -> Candidates:
@@ -138,19 +156,31 @@ class SceneModel:
         color = enlarged(color, self.scale)
         moving = self.colours.moving(color)
         rows = [self._outlines(color, view, hints, moving) for view in self.views]
+        shown = np.concatenate(
+            [
+                np.zeros(len(row.steps), dtype=bool) if view.moves else are_sure(row, 1.0)
+                for row, view in zip(rows, self.views, strict=True)
+            ]
+        )
         # In the difference a shadow is part of its bead.
         trust = [_DIFFERENCE_TRUST if view.moves else 1.0 for view in self.views]
         outlines = join_outlines(
             [row._replace(steps=row.steps * part) for row, part in zip(rows, trust, strict=True)]
         )
-        outlines = outlines.chosen(apart(outlines, self._look.apart))
+        if self._known is not None:
+            # The inside of a clear bead has an outline, too.
+            have_size = self._known.have_size(outlines.discs[:, 2] / self.scale)
+            outlines, shown = outlines.chosen(have_size), shown[have_size]
+        kept = apart(outlines, self._look.apart)
+        outlines, shown = outlines.chosen(kept), shown[kept]
         colours, around = colours_of(color, outlines.discs)
         floor = np.full_like(colours, math.nan)
         if self.colours.knows_background:
             floor, beside = colours_of(self.colours.background, outlines.discs)
             radii = outlines.discs[:, 2] / self.scale
             now = colours, around
-            here = ~left_behind(now, (floor, beside), self._known, radii)
+            # What shows in the picture itself is here, on whatever stain.
+            here = shown | ~left_behind(now, (floor, beside), self._known, radii)
             here &= ~ends_of_others(color, moving, outlines.discs, outlines.support, now)
             outlines = outlines.chosen(here)
             colours, around, floor = colours[here], around[here], floor[here]
@@ -170,6 +200,7 @@ class SceneModel:
         distances = self._known.distances(candidates.colours, radii)
         rest = candidates.moving < MOVING_SHARE
         near = distances < np.where(rest, ALIKE, _ALIKE_MOVING)
+        near &= self._at_rest.allows(candidates)
         alike = np.asarray(told & self._known.have_size(radii) & near)
         if self.shadows is not None:
             dark = darken(candidates.colours, candidates.floor)
@@ -184,32 +215,18 @@ class SceneModel:
         moving: NDArray[np.uint8] | None = None,
     ) -> Outlines:
         """Discs that show in a view, smeared ones where it moves; their steps over the usual."""
-        picture = view.of(color, self.colours)
-        starts = centres_of_all_sizes(picture, view.voting, _LEAST_VOTES)[:, :3]
-        outlines = fit_outlines(picture, np.empty((0, 3)) if hints is None else hints, view.voting)
-        sure = outlines.discs[
-            (outlines.support >= _SURE_SUPPORT) & (outlines.steps >= _SURE_STEP * view.voting.step)
-        ]
-        if len(sure):
-            apart_from_sure = cKDTree(sure[:, :2]).query(starts[:, :2])[0]
-            starts = starts[apart_from_sure > _SAME_SHARE * view.voting.smallest]
-        outlines = join_outlines([outlines, fit_outlines(picture, starts, view.voting)])
-        if hints is not None:
-            starts = np.concatenate([hints, starts])
-        steps = outlines.steps / view.voting.step
-        good = (outlines.support >= _LEAST_SUPPORT) & (steps >= _LEAST_STEP)
-        good &= outlines.steps >= max(_LEAST_LEVELS, _LEAST_NOISES * view.voting.noise)
-        sharp = outlines._replace(steps=steps).chosen(good)
-        if moving is None or self._known is None or not self.colours.knows_background:
-            return sharp
-        smeared = smeared_discs(picture, moving, starts[~good], view.voting)
-        return join_outlines([sharp, smeared.chosen(smeared.steps >= _LEAST_STEP)])
+        smear = moving if self._known is not None and self.colours.knows_background else None
+        return search_outlines(view.of(color, self.colours), view.voting, hints, smear)
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
-        chosen = [enlarged(frame, self.scale) for frame in frames[:: max(1, len(frames) // 4)]]
-        self.views = self._plain_views(chosen)
+        chosen = [
+            enlarged(frame, self.scale) for frame in frames[:: max(1, len(frames) // _STEP_FRAMES)]
+        ]
+        low, high = (self.scale * radius for radius in self._look.radii)
+        search = ViewSearch(chosen, self.colours, (low, high))
+        self.views = search.plain_views(self._look.sign)
         if self.colours.knows_background:
-            self.views.append(self._view(chosen, moves=True, sign=1))
+            self.views.append(search.view(moves=True, sign=1))
         if not self._look.radii[0] > 0.0:
             # What moves tells the size first.
             radii = max(self.views, key=lambda view: (view.evidence > 0.0, view.moves))
@@ -242,45 +259,11 @@ class SceneModel:
         self._moved = every.outlines.discs[moving]
         known = moving if self.sees_motion else good
         self._known = KnownBeads.of(every.colours[known], every.outlines.discs[known, 2])
+        self._at_rest = AtRest()
+        moved = self.alike(every) & moving
+        if self.sees_motion and moved.any():
+            self._at_rest = AtRest.beside(every.chosen(moved))
         self._rested = every.outlines.discs[self.alike(every) & good & ~moving]
-
-    def _plain_views(self, frames: Sequence[NDArray[np.uint8]]) -> list[View]:
-        """The picture, for bright discs, dark ones, or both where both occur.
-
-        Between dense discs of one brightness are gaps of the other.
-        """
-        signs = (1, -1) if self._look.sign == 0 else (self._look.sign,)
-        views = [self._view(frames, moves=False, sign=sign) for sign in signs]
-        views.sort(key=lambda view: -view.evidence)
-        if not self.colours.knows_background:
-            return views[:1]
-        return [
-            view
-            for view in views
-            if view is views[0] or view.evidence > _OTHER_SIGN_SHARE * views[0].evidence
-        ]
-
-    def _view(self, frames: Sequence[NDArray[np.uint8]], *, moves: bool, sign: int) -> View:
-        """A view of the frames with the size, brightness and edges of the discs in it."""
-        low, high = (self.scale * radius for radius in self._look.radii)
-        noise = self.colours.unrest if moves else self.colours.noise
-        view = View(moves, Voting(low, high, sign, 1.0, noise), 0.0)
-        step = usual_step(view.of(frames[-1], self.colours), noise)
-        voting = view.voting._replace(step=step)
-        if not low > 0.0:
-            voting = search_radii(view.of(frames[len(frames) // 2], self.colours), voting)
-        for part in _WEAKER:
-            # Hands, rails and skirting boards may have stronger edges than the beads.
-            step = max(part * voting.step, _LEAST_LEVELS)
-            found = view._replace(voting=voting._replace(step=step))
-            outlines = join_outlines([self._outlines(frame, found) for frame in frames])
-            if len(outlines.steps):
-                break
-        else:
-            return View(moves, voting, 0.0)
-        usual = float(np.quantile(outlines.steps, 0.75))
-        evidence = float((outlines.support**2 * outlines.steps).sum())
-        return View(moves, voting._replace(step=step * usual), evidence)
 
 
 def _some(frames: Sequence[NDArray[np.uint8]], count: int) -> list[NDArray[np.uint8]]:
@@ -292,7 +275,7 @@ def _some(frames: Sequence[NDArray[np.uint8]], count: int) -> list[NDArray[np.ui
 def scene_model(frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> SceneModel:
     """Learn what beads look like from frames of a film; see `SceneModel`."""
     model = SceneModel(frames, look)
-    if look.radii[0] > 0.0 or model.radii[1] >= _LEAST_RADIUS_PX:
+    if look.radii[0] > 0.0 or math.sqrt(math.prod(model.radii)) >= _LEAST_RADIUS_PX:
         return model
     # The size was found: small beads are seen better enlarged.
     return SceneModel(frames, replace(look, radii=model.radii))

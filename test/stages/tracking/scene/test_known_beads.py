@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, KnownBeads
+from nanorocks_ros.stages.tracking.scene.bead_looks import Candidates
+from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, AtRest, KnownBeads
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
 ORANGE = np.array([70.0, 120.0, 220.0])
 
@@ -34,3 +36,31 @@ def test_few_mistakes_do_not_count_as_beads():
     colours = np.tile(ORANGE, (99, 1))
     mixed = KnownBeads.of(np.vstack([colours, [[255.0] * 3]]), np.full(100, 15.0))
     assert mixed.distances(np.array([[255.0] * 3]), np.array([15.0]))[0] > ALIKE
+
+
+def discs(quality, moving):
+    """Discs whose outlines have a quality, and of which a share moves."""
+    count = len(quality)
+    none, colours = np.zeros(count), np.zeros((count, 3))
+    outlines = Outlines(np.ones((count, 3)), none, none, np.array(quality), np.ones(count))
+    return Candidates(outlines, colours, colours, colours, np.array(moving), none.astype(bool))
+
+
+def test_stains_do_not_show_as_well_as_beads_that_move():
+    at_rest = AtRest.beside(discs(np.linspace(0.8, 1.0, 40), np.full(40, 0.6)))
+    rested = at_rest.allows(discs([0.35, 0.35, 0.9, 0.9], [0.0, 0.25, 0.0, 0.6]))
+    assert rested.tolist() == [False, False, True, True]
+
+
+def test_a_bead_that_moves_may_show_badly():
+    at_rest = AtRest.beside(discs(np.linspace(0.8, 1.0, 40), np.full(40, 0.6)))
+    assert at_rest.allows(discs([0.35], [0.5])).all()
+
+
+def test_without_beads_that_move_any_disc_may_rest():
+    assert AtRest().allows(discs([0.2], [0.0])).all()
+
+
+def test_colours_of_known_beads_are_those_of_the_discs():
+    colours = np.array([[10.0, 20.0, 30.0], [60.0, 80.0, 40.0]])
+    assert np.allclose(KnownBeads.of(colours, np.full(2, 9.0)).colours, colours)

@@ -82,6 +82,20 @@ def test_species_are_told_apart_by_their_colour():
     assert distances(both, truth[0]).max() < 0.5
 
 
+@pytest.mark.parametrize('told', [0, 1])
+def test_a_species_of_any_colour_beside_one_whose_colour_is_told(told):
+    scene = replace(SCENE, colours=((40, 40, 200), (60, 60, 60)), sizes=(9.0, 9.0), count=24)
+    frames, truth = draw(scene)
+    rows = ['diameter_mm: 18, look: auto', 'diameter_mm: 18, look: auto']
+    rows[told] = 'diameter_mm: 18, colour: red'
+    found = detected(tray_of(rows), frames)
+    red, dark = found[told], found[1 - told]
+    # Colours are drawn in turn.
+    for beads, places in ((red, truth[0][::2]), (dark, truth[0][1::2])):
+        assert len(beads.radii) == len(places)
+        assert distances(beads.positions, places).max() < 0.5
+
+
 def test_without_a_lesson_the_look_is_learnt_on_the_way(film):
     frames, truth = film
     detector = SceneDetector(tray_of(['diameter_mm: 18, look: auto']), SCALE)

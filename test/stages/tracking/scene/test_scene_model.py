@@ -51,3 +51,9 @@ def test_an_empty_film_has_no_disc():
     model = scene_model(frames, BeadLook(radii=(8.0, 12.0)))
     candidates = model.candidates(frames[0])
     assert model.alike(candidates).sum() == 0
+
+
+@pytest.mark.parametrize('more', [{'count': 10_000}, {'radii': (200.0, 200.0)}])
+def test_more_beads_than_fit_are_not_drawn(more):
+    with pytest.raises(SystemExit, match='fit in 400 x 300 px; draw fewer'):
+        draw(replace(DrawnScene(frames=1), **more))

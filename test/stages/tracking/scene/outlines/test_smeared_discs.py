@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
-from nanorocks_ros.stages.tracking.scene.outline_fits import fit_outlines
-from nanorocks_ros.stages.tracking.scene.smeared_discs import smeared_discs
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import fit_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.smeared_discs import smeared_discs
 
 PLACE = np.array([152.0, 121.0])
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.outline_kernels import (
+from nanorocks_ros.stages.tracking.scene.outlines.outline_kernels import (
     RAYS,
     RESULTS,
     Search,
@@ -18,7 +18,7 @@ from nanorocks_ros.stages.tracking.scene.outline_kernels import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
+    from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
 
 # Part of the radius on either side of the outline that is searched for edges, by iteration.
 _REACHES = 0.5, 0.25
@@ -54,6 +54,11 @@ class Outlines(NamedTuple):
     radius_errors: NDArray[np.float64]
     support: NDArray[np.float64]
     steps: NDArray[np.float64]
+
+    @property
+    def quality(self) -> NDArray[np.float64]:
+        """How well each circle shows, 0 to 1, (n,); steps are over the usual one."""
+        return np.asarray(self.support * np.minimum(self.steps, 1.0))
 
     def chosen(self, rows: NDArray[np.bool_]) -> Outlines:
         """Some of the circles."""

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nanorocks_ros.stages.tracking.scene.disc_kernels import leave_out_near, ring_medians
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import leave_out_near, ring_medians
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,7 +51,7 @@ def apart(outlines: Outlines, radii: float = 1.0) -> NDArray[np.bool_]:
         Smallest distance of two centres, in radii.
     """
     discs = np.ascontiguousarray(outlines.discs)
-    order = np.argsort(-outlines.support * np.minimum(outlines.steps, 1.0), kind='stable')
+    order = np.argsort(-outlines.quality, kind='stable')
     keep = np.ones(len(discs), dtype=bool)
     leave_out_near(discs, order, radii, keep)
     return keep

@@ -1,6 +1,6 @@
 """Discs smeared by their motion: longer one way, with soft edges, where the background changes.
 
-Tested by ``test/stages/tracking/scene/test_smeared_discs.py``.
+Tested by ``test/stages/tracking/scene/outlines/test_smeared_discs.py``.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.disc_measures import marked_shares
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_smeared
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import marked_shares
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines, fit_smeared
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
+    from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
 
 # Radius to which the picture is reduced, [px]: soft edges get sharper by it.
 _RADIUS_PX = 10.0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.disc_kernels import add_votes, find_peaks
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import add_votes, find_peaks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.disc_measures import apart
-from nanorocks_ros.stages.tracking.scene.edge_votes import Voting, find_centres
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines, fit_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import apart
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting, find_centres
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines, fit_outlines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,6 +1,6 @@
 """Votes for discs, discs that lie on better ones, and colours of circles around discs, compiled.
 
-Tested by ``test/stages/tracking/scene/test_disc_measures.py`` and ``test_edge_votes.py``.
+Tested by ``test/stages/tracking/scene/outlines/test_disc_measures.py`` and ``test_edge_votes.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Edges along the rays of a disc, and the outline through them, compiled.
 
-Tested by ``test/stages/tracking/scene/test_outline_fits.py``.
+Tested by ``test/stages/tracking/scene/outlines/test_outline_fits.py``.
 """
 
 from __future__ import annotations

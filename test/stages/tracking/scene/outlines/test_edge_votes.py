@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.scene.edge_votes import (
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import (
     Voting,
     centres_of_all_sizes,
     find_centres,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.disc_measures import apart, ring_colours
-from nanorocks_ros.stages.tracking.scene.outline_fits import Outlines
+from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import apart, ring_colours
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
 
 def outlines_of(discs, support):

@@ -1,6 +1,6 @@
 """Discs that are the end of something longer that moves, such as a finger.
 
-Tested by ``test/stages/tracking/scene/test_open_outlines.py``.
+Tested by ``test/stages/tracking/scene/outlines/test_open_outlines.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.edge_votes import Voting
-from nanorocks_ros.stages.tracking.scene.outline_fits import fit_outlines
+from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import Voting
+from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import fit_outlines
 
 VOTING = Voting(8.0, 14.0, -1, 70.0, 2.0)
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.tracking.scene.open_outlines import ends_of_others
+from nanorocks_ros.stages.tracking.scene.outlines.open_outlines import ends_of_others
 
 FLOOR, BEAD = (30, 30, 30), (60, 120, 200)
 RADIUS = 12
