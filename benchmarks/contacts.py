@@ -163,18 +163,15 @@ def _report_true() -> None:
                 contacts_of(tray, true_tracks(tray, _settings(pairs, walls, 5), run, frames))
                 for run in range(runs)
             ]
-            rebounds = np.mean(
-                [sum(isinstance(contact, Rebound) for contact in a) for a in contacts_by_run]
+            rebounds, collisions = (
+                np.mean([sum(isinstance(contact, kind) for contact in a) for a in contacts_by_run])
+                for kind in (Rebound, PairCollision)
             )
             likelihoods = [_likelihoods(contact) for contact in contacts_by_run]
             name = f'{number}, {pairs:g} / {walls:g}'
-            counts = (
-                f'{rebounds:.0f}',
-                f'{np.mean([len(a) for a in contacts_by_run]) - rebounds:.0f}',
-            )
             for kind, truth, grid, column in (
-                (f'walls ({counts[0]} rebounds)', walls, _WALLS, 0),
-                (f'pairs ({counts[1]} collisions)', pairs, _PAIRS, 1),
+                (f'walls ({rebounds:.0f} rebounds)', walls, _WALLS, 0),
+                (f'pairs ({collisions:.0f} collisions)', pairs, _PAIRS, 1),
             ):
                 covered = _row(
                     f'{name}, {kind}', truth, grid, [contact[column] for contact in likelihoods]
@@ -228,13 +225,14 @@ def _report_filmed() -> None:
             films[tracks.tray].append(tracks)
         for number, tracks in films.items():
             contacts = contacts_of(load_trays()[number], iter(tracks))
-            rebounds = sum(isinstance(contact, Rebound) for contact in contacts)
+            rebounds, collisions = (
+                sum(isinstance(contact, kind) for contact in contacts)
+                for kind in (Rebound, PairCollision)
+            )
             of_walls, of_pairs = _likelihoods(contacts)
             name = f'{number}, {pairs:g} / {walls:g}'
             _row(f'{name}, walls ({rebounds} rebounds)', walls, _WALLS, [of_walls])
-            _row(
-                f'{name}, pairs ({len(contacts) - rebounds} collisions)', pairs, _PAIRS, [of_pairs]
-            )
+            _row(f'{name}, pairs ({collisions} collisions)', pairs, _PAIRS, [of_pairs])
 
 
 def report() -> None:
