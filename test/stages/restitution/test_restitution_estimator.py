@@ -11,8 +11,9 @@ from bent_flights import bent_flights
 from contact_draws import drawn_collision
 from wall_rebounds import wall_rebounds
 
-from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.errors import ConfigurationError, FitError
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods
 from nanorocks_ros.physics.haff_law import haff_speed
 from nanorocks_ros.physics.paper_formulas import paper_restitution_of_decay
 from nanorocks_ros.records import (
@@ -231,6 +232,19 @@ def test_of_trays_that_are_not_where_the_settings_say_nothing_is_told():
     )
     assert estimates[-1].quality is Quality.WRONG_SCALE
     assert stage.evidence is None
+
+
+def test_evidence_that_another_version_wrote_is_refused():
+    stage = fitter()
+    all_estimates(stage, simulated_cycle())
+    stage.flush()
+    arrays = stage.evidence.arrays()
+    read = CycleLikelihoods.from_arrays(arrays, 'evidence.npz')
+    assert np.array_equal(read.contacts.beads, stage.evidence.contacts.beads)
+    # With one nuisance fewer.
+    arrays['contacts.beads'] = arrays['contacts.beads'][:-1]
+    with pytest.raises(FitError, match=r'evidence\.npz: .*analyse the recording again'):
+        CycleLikelihoods.from_arrays(arrays, 'evidence.npz')
 
 
 def test_a_cycle_that_the_next_shake_cuts_short_is_final_then():
