@@ -176,10 +176,13 @@ class SeenTray:
 
     def moments(self, frames: int) -> Iterator[Moment]:
         """Iterate over the frames; to be called once."""
-        for moment in self._beads.moments(frames):
-            positions = self._middle + (moment.positions - self._middle) @ self._view
-            places, motion = self._projected(positions, moment.velocities @ self._view)
-            yield replace(moment, positions=places, velocities=motion)
+        yield from map(self.seen, self._beads.moments(frames))
+
+    def seen(self, moment: Moment) -> Moment:
+        """A moment as the camera sees it."""
+        positions = self._middle + (moment.positions - self._middle) @ self._view
+        places, motion = self._projected(positions, moment.velocities @ self._view)
+        return replace(moment, positions=places, velocities=motion)
 
     def _projected(
         self, positions: NDArray[np.float64], velocities: NDArray[np.float64]

@@ -9,9 +9,18 @@ import pytest
 
 from benchmarks import sensitivity
 from benchmarks.contacts import contacts_of
-from benchmarks.sensitivity import IDEAL, Deviation, cycle_of, tracks_of_cycle, true_tray
+from benchmarks.sensitivity import (
+    IDEAL,
+    Deviation,
+    SeenTray,
+    cycle_of,
+    tracks_of_cycle,
+    true_tray,
+)
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Headline, PairCollision, Quality
+from nanorocks_ros.settings import SimulationSettings, with_values
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
 
 TOLD = load_trays()
 
@@ -80,6 +89,23 @@ def test_a_tilted_camera_sees_motion_along_its_axis():
     # Velocities after shaking are at random in space: along the axis they are as large.
     share = along.std() / true.velocities.std()
     assert share == pytest.approx(math.sin(math.radians(2.0)), rel=0.6)
+
+
+def test_a_near_camera_aside_sees_vertical_motion():
+    settings = with_values(
+        SimulationSettings(), {'tray': 1, 'seed': 3, 'first_shake': 0.0}, 'test'
+    )
+    gas = ShakenTray(settings, TOLD[1])
+    true = next(gas.moments(1))
+    camera = SeenTray(gas, TOLD[1], row('camera at 0.2 m, 40 mm aside'))
+    # Places a little later are those that the velocities in the picture say.
+    step = 1e-6
+    later = replace(true, positions=true.positions + step * true.velocities)
+    seen = camera.seen(true)
+    moved = camera.seen(later).positions - seen.positions
+    assert np.allclose(moved[:, :2], step * seen.velocities[:, :2], rtol=1e-4, atol=0.0)
+    extra = np.std(seen.velocities[:, 0] - true.velocities[:, 0])
+    assert extra == pytest.approx(0.2 * np.std(true.velocities[:, 2]), rel=0.3)
 
 
 # Their masses are not those of the diameter that is told, so collisions seem to lose momentum.
