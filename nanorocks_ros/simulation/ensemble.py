@@ -6,7 +6,7 @@ Tested by ``test/simulation/test_shaken_tray.py``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from nanorocks_ros.simulation.engine import observables as columns
 from nanorocks_ros.simulation.engine.event_loop import run_until
 from nanorocks_ros.simulation.engine.flight.turning_motion import new_motions
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
-from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, new_state
+from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, State, new_state
 from nanorocks_ros.simulation.engine.input_checks import (
     check_room,
     check_times,
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.settings import SimulationSettings
-    from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
     from nanorocks_ros.simulation.initial_state import Inventory
 
@@ -159,7 +158,7 @@ def _small_run(
     purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
     keys = np.array([key_for(settings.seed, run, purpose) for purpose in purposes])
     ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))
-    placed, state = _begin(
+    placed, fields = _begin(
         rules,
         ranges,
         drawn.species,
@@ -177,6 +176,7 @@ def _small_run(
             'found no room for all beads',
             'give fewer or smaller beads',
         )
+    state = State(*fields)
     ends = instants[-1:] if instants.size else np.zeros(1)
     times = np.concatenate((instants, ends))
     output = RunRecorder(state, rules, times[:0].copy(), times, n_species, log=False).output
@@ -203,8 +203,8 @@ def _begin(
     mean_speed: float,
     maxwell: bool,
     vertical: float,
-) -> tuple[int, State]:
-    """Begin a run: the number of beads that found room, and the state of the gas."""
+) -> tuple[int, tuple[Any, ...]]:
+    """Begin a run: the number of beads that found room, and the fields of the state of the gas."""
     diameters = draw_diameters(ranges[0], ranges[1], keys[0])
     sides = np.array((rules.sides[0], rules.sides[1], rules.sides[2]))
     radii = 0.5 * diameters
@@ -213,4 +213,5 @@ def _begin(
     set_drag(drag, diameters, ranges[2], viscosity)
     velocities = draw_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
     state = new_state(positions, velocities, radii, masses, species, drag, motions, rules)
-    return placed, state
+    # A named tuple is made by Python code, in which an interrupt would end the process.
+    return placed, state[:]

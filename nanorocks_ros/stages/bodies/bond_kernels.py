@@ -85,7 +85,7 @@ def update_pairs(table: PairTable, time: float, frame_step: float, beads: SeenBe
     """
     since = time - table.values[:, LAST]
     weights = -np.expm1(-since[:, None] / _SMOOTHING_TIMES)
-    return _update_pairs(table, time, frame_step, beads, weights)
+    return PairTable(*_update_pairs(table, time, frame_step, beads, weights))
 
 
 @compiled
@@ -95,7 +95,11 @@ def _update_pairs(
     frame_step: float,
     beads: SeenBeads,
     weights: NDArray[np.float64],
-) -> PairTable:
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Fields of the new table, since a named tuple is made by Python code.
+
+    There an interrupt would end the process.
+    """
     keys, first, second = touching_pairs(beads)
     rows = table.keys.size
     new = PairTable(
@@ -122,7 +126,7 @@ def _update_pairs(
             new.values[count] = table.values[row]
             count += 1
         row += 1
-    return PairTable(new.keys[:count], new.values[:count], new.bonded[:count])
+    return new.keys[:count], new.values[:count], new.bonded[:count]
 
 
 @compiled

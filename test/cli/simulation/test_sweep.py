@@ -168,7 +168,7 @@ def test_ctrl_c_keeps_finished_runs_and_the_same_command_resumes(tmp_path):
         '--restitution',
         '0.6:0.9:4',
         '--runs',
-        '300',
+        '900',
         '--times',
         '0:20:5',
         '--seed',
@@ -185,13 +185,13 @@ def test_ctrl_c_keeps_finished_runs_and_the_same_command_resumes(tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     _, error = process.communicate()
     assert process.returncode == 130
-    runs = int(error.split('interrupted; ')[1].split(' of 1200')[0])
+    runs = int(error.split('interrupted; ')[1].split(' of 3600')[0])
     # An earlier line may report the compilation of the simulation.
     assert error.splitlines()[-1] == (
-        f'nanorocks: interrupted; {runs} of 1200 runs are kept in {folder}; '
+        f'nanorocks: interrupted; {runs} of 3600 runs are kept in {folder}; '
         'the same command goes on from there'
     )
-    assert 0 < runs < 1200
+    assert 0 < runs < 3600
     assert not output.exists()
 
     again = start(*arguments, *quick, '-o', str(output))

@@ -305,7 +305,7 @@ def test_time_and_orientation_of_images_are_read_from_exif(tmp_path):
 def test_images_without_times_need_a_rate(tmp_path, names):
     folder = write_images(tmp_path / 'images', names)
     with pytest.raises(
-        ConfigurationError, match=r'have no time stamps: .*; tell .* --rate 30 -o '
+        ConfigurationError, match=r'have no time stamps: .*; give .* --rate 30 -o '
     ):
         import_films([folder], tmp_path / 'bag', STARTED, lambda _: None)
     assert not (tmp_path / 'bag').exists()

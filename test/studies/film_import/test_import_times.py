@@ -60,7 +60,7 @@ def test_a_raw_stream_has_its_declared_rate(tmp_path, name, options):
 def test_a_raw_stream_without_a_rate_needs_one(tmp_path, name, options):
     film = write_raw(tmp_path / name, range(6), **options)
     with pytest.raises(
-        ConfigurationError, match=r'a\..*: has neither time stamps.*; tell .* --rate 30 -o '
+        ConfigurationError, match=r'a\..*: has neither time stamps.*; give .* --rate 30 -o '
     ):
         import_films([film], tmp_path / 'bag', STARTED, lambda _: None)
     assert not (tmp_path / 'bag').exists()
