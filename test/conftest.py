@@ -6,6 +6,11 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes says something of the machine.
+settings.register_profile('nanorocks', deadline=None)
+settings.load_profile('nanorocks')
 
 pytest_plugins = ['dask_fixtures']
 

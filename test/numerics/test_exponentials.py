@@ -12,7 +12,7 @@ from nanorocks_ros.numerics.exponentials import decay_time, decayed, logarithm
 
 
 @given(st.floats(0.0, 1.0, exclude_min=True, exclude_max=True))
-@settings(deadline=None, max_examples=500)
+@settings(max_examples=500)
 def test_our_logarithm_is_right_to_three_units_in_the_last_place(x):
     assert logarithm(x) == pytest.approx(math.log(x), rel=0.0, abs=3.0 * math.ulp(math.log(x)))
 
@@ -23,7 +23,7 @@ def test_it_is_right_next_to_one_and_next_to_the_halvings():
 
 
 @given(st.floats(1e-300, 700.0))
-@settings(deadline=None, max_examples=500)
+@settings(max_examples=500)
 def test_what_has_gone_and_what_is_left_of_a_decay_have_all_digits(x):
     gone, left = decayed(x)
     assert gone == pytest.approx(-math.expm1(-x), rel=2e-15)
@@ -32,7 +32,7 @@ def test_what_has_gone_and_what_is_left_of_a_decay_have_all_digits(x):
 
 
 @given(st.floats(1e-300, 0.999))
-@settings(deadline=None, max_examples=500)
+@settings(max_examples=500)
 def test_the_time_of_a_decay_is_the_inverse(gone):
     time = decay_time(gone)
     assert time == pytest.approx(-math.log1p(-gone), rel=2e-15)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hexagonal_discs import hexagonal_patch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as some
 from scipy.spatial import ConvexHull, QhullError
 
@@ -129,7 +129,6 @@ def test_discs_of_a_patch_touch_and_do_not_overlap():
         assert np.allclose(np.reshape(gaps, (n, n - 1)).min(axis=1), 2 * R, rtol=1e-9)
 
 
-@settings(deadline=None)
 @given(some.integers(0, 10_000), some.integers(2, 12))
 def test_no_flat_cluster_fills_more_than_hexagonal_order_or_has_less_than_groemers_hull(seed, n):
     rng = np.random.default_rng(seed)

@@ -34,7 +34,7 @@ def fluctuating_decay(rng, strength, white, v0=6e-3, tau=6.0):
     return np.exp(log_v)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(some.floats(1e-4, 2e-2), some.floats(1.0, 30.0))
 def test_an_exact_decay_gives_back_its_parameters(v0, tau):
     speed = haff_speed(TIME, v0, tau)

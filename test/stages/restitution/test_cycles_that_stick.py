@@ -98,7 +98,7 @@ def final(*records):
     return [*estimates, *estimator.flush()][-1]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 @given(
     number=st.integers(10, 40),
     of_bodies=st.floats(0.0, 1.0),
