@@ -38,7 +38,11 @@ Function = TypeVar('Function', bound='Callable[..., Any]')
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function at its first call, and cache the result on disk if possible."""
+    """Compile a function at its first call, and cache the result on disk if possible.
+
+    Where Python calls it, it returns no named tuple but a plain one, such as ``state[:]``: a named
+    one is made by Python code, in which an interrupt would end the process.
+    """
     return _compiled(function, {})
 
 

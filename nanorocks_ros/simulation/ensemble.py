@@ -213,5 +213,4 @@ def _begin(
     set_drag(drag, diameters, ranges[2], viscosity)
     velocities = draw_velocities(masses, mean_speed, maxwell, vertical, keys[2], 0)
     state = new_state(positions, velocities, radii, masses, species, drag, motions, rules)
-    # A named tuple is made by Python code, in which an interrupt would end the process.
     return placed, state[:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -162,3 +163,40 @@ def test_a_kernel_for_some_types_is_a_constant_for_others():
     assert asked_for(np.full((2, 3), 0.5)) == 3.5
     assert asked_for(np.full(2, 0.5)) == -1.0
     assert corner(np.full((2, 3), 0.5)) == 3.5
+
+
+def compiles(function):
+    """Whether a function definition is compiled."""
+    names = {ast.unparse(decorator).partition('(')[0] for decorator in function.decorator_list}
+    return bool(names & {'compiled', 'kernel', 'kernel_where', 'inlined'})
+
+
+def named(node):
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+
+
+def test_no_compiled_function_hands_a_named_tuple_to_python():
+    """An interrupt in the Python code that makes one ends the process."""
+    trees = [ast.parse(path.read_text()) for path in (ROOT / 'nanorocks_ros').rglob('*.py')]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    tuples = {
+        node.name
+        for node in nodes
+        if isinstance(node, ast.ClassDef)
+        and 'NamedTuple' in {name for base in node.bases for name in named(base)}
+    }
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    handing = {
+        function.name
+        for function in functions
+        if compiles(function) and function.returns and named(function.returns) & tuples
+    }
+    assert handing, 'none is found'
+    called = {
+        ast.unparse(call.func)
+        for function in functions
+        if not compiles(function)
+        for call in ast.walk(function)
+        if isinstance(call, ast.Call)
+    }
+    assert handing & called == set()

@@ -51,21 +51,27 @@ def balance_log_likelihood(
     return total
 
 
+def missing_momentum(collision: PairCollision) -> NDArray[np.float64]:
+    """Momentum that a collision seems to gain, in stated errors of a component, (2,)."""
+    missing: NDArray[np.float64] = collision.masses @ (collision.after - collision.before)
+    return missing / _stated_error(collision)
+
+
+def _stated_error(collision: PairCollision) -> float:
+    """Of a component of the momentum that is missing, [kg m/s]."""
+    errors = np.hypot(collision.before_errors, collision.after_errors)
+    return math.hypot(*(collision.masses * errors))
+
+
 def _missing(collision: PairCollision) -> tuple[float, float, float]:
     """Momentum missing along the line of centres and across, and by which masses err along it.
 
     In units of the stated error of a component.
     """
-    errors = np.hypot(collision.before_errors, collision.after_errors)
-    error = math.hypot(*(collision.masses * errors))
-    change = collision.after - collision.before
     normal = collision.separation / math.hypot(*collision.separation)
-    missing = collision.masses @ change / error
-    along = change @ normal
+    along, across = missing_momentum(collision) @ np.column_stack([normal, normal[::-1] * (-1, 1)])
     # A mass grows with the third power of the radius.
-    of_masses = 3.0 * collision.radius_errors / collision.radii * collision.masses * along / error
-    return (
-        float(missing @ normal),
-        float(normal[0] * missing[1] - normal[1] * missing[0]),
-        math.hypot(*of_masses),
-    )
+    shares = 3.0 * collision.radius_errors / collision.radii
+    gained = collision.masses * ((collision.after - collision.before) @ normal)
+    of_masses = math.hypot(*(shares * gained)) / _stated_error(collision)
+    return float(along), float(across), of_masses

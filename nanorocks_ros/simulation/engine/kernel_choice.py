@@ -6,13 +6,14 @@ Tested by ``test/simulation/engine/neighbours/test_neighbour_lists.py``.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nanorocks_ros.errors import SimulationError
+from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.simulation.engine.flight.turning_motion import new_motions
-from nanorocks_ros.simulation.engine.gas_state import BODY, ORIGINAL, new_state
+from nanorocks_ros.simulation.engine.gas_state import BODY, ORIGINAL, State, new_state
 from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
     list_skin,
     with_lists,
@@ -22,7 +23,6 @@ from nanorocks_ros.simulation.engine.neighbours.list_tuning import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.simulation.engine.gas_state import State
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules
 
 # From so many beads on lists are faster (`python -m benchmarks engine`).
@@ -72,7 +72,7 @@ def arranged_state(
     order = np.arange(radii.size)
     if listed:
         order = z_order(positions, 2.0 * float(radii.max()) + skin)
-    state = new_state(
+    fields = _new_fields(
         positions[order],
         velocities[order],
         radii[order],
@@ -82,6 +82,7 @@ def arranged_state(
         new_motions(radii.size, rules),
         rules,
     )
+    state = State(*fields)
     state.links[:, ORIGINAL] = order
     if spins.shape[0]:
         state.spins[:] = spins[order]
@@ -89,3 +90,18 @@ def arranged_state(
         state.masses[:, 1] = masses
         state.bodies[:, BODY] = order
     return with_lists(state, rules, skin) if listed else state
+
+
+@compiled
+def _new_fields(
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    masses: NDArray[np.float64],
+    species: NDArray[np.int32],
+    drag: NDArray[np.float64],
+    motions: NDArray[np.float64],
+    rules: Rules,
+) -> tuple[Any, ...]:
+    """Fields of `new_state`; see `compiled` for why not the state itself."""
+    return new_state(positions, velocities, radii, masses, species, drag, motions, rules)[:]

@@ -96,10 +96,7 @@ def _update_pairs(
     beads: SeenBeads,
     weights: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Fields of the new table, since a named tuple is made by Python code.
-
-    There an interrupt would end the process.
-    """
+    """Fields of the new table."""
     keys, first, second = touching_pairs(beads)
     rows = table.keys.size
     new = PairTable(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.inference.contacts.momentum_balance import MOST_MISSING
+from nanorocks_ros.inference.contacts.momentum_balance import MOST_MISSING, missing_momentum
 
 if TYPE_CHECKING:
     from nanorocks_ros.records import PairCollision
@@ -36,8 +36,7 @@ def is_isolated_collision(pair: PairCollision) -> bool:
     change = pair.after - pair.before
     approach = -float((pair.before[1] - pair.before[0]) @ normal)
     approach_error = float(np.hypot(*pair.before_errors))
-    momentum_loss = pair.masses @ change
-    momentum_error = math.hypot(*(pair.masses * errors))
+    missing = missing_momentum(pair)
     slip = float((change[1] - change[0]) @ tangent)
     # An error in the direction of the normal turns part of the normal change into slip.
     normal_error = pair.separation_error / math.hypot(*pair.separation)
@@ -49,6 +48,6 @@ def is_isolated_collision(pair: PairCollision) -> bool:
     return bool(
         relative_speeds[1] > _MAX_MERGED_RATIO * relative_speeds[0]
         and approach > MIN_SIGNAL * approach_error
-        and float(momentum_loss @ momentum_loss) < MOST_MISSING**2 * momentum_error**2
+        and float(missing @ missing) < MOST_MISSING**2
         and abs(slip) < MAX_SIGMAS * slip_error
     )

@@ -11,6 +11,7 @@ from contact_draws import drawn_collisions
 from nanorocks_ros.inference.contacts.momentum_balance import (
     MOST_MISSING,
     balance_log_likelihood,
+    missing_momentum,
 )
 
 SCALES = (1.0, 1.5, 2.25)
@@ -27,14 +28,9 @@ def understated(collisions, factor):
         )
         for collision in collisions
     ]
-    return [collision for collision in stated if missing(collision) < MOST_MISSING]
-
-
-def missing(collision):
-    """Momentum over its stated error."""
-    errors = np.hypot(collision.before_errors, collision.after_errors)
-    lost = collision.masses @ (collision.after - collision.before)
-    return np.hypot(*lost) / np.hypot(*(collision.masses * errors))
+    return [
+        collision for collision in stated if np.hypot(*missing_momentum(collision)) < MOST_MISSING
+    ]
 
 
 @pytest.mark.parametrize('factor', SCALES)
