@@ -225,7 +225,7 @@ class BodySettings:
 
     interval: float = setting(0.2, 'time between two counts of bodies', 's', low=0.0, high=60.0)
     delay: float = setting(
-        1.0,
+        6.0,
         'time after a frame at which its bodies are counted; sticking shows only in later frames',
         's',
         low=0.0,

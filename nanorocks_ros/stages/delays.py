@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from nanorocks_ros.records import (
     NS,
     BodyEstimate,
@@ -12,12 +14,29 @@ from nanorocks_ros.records import (
     Rebound,
     SpeedEstimate,
 )
+from nanorocks_ros.settings import PipelineSettings
 
-# Two beads must stay together for longer than free beads do by chance. Counts of bodies wait for
-# the merges; their delay is the setting `bodies.delay`, whose default this is.
-_MERGE_NS = NS
+if TYPE_CHECKING:
+    from nanorocks_ros.settings import BodySettings
+
 # For records that are on their way between nodes.
 _TRANSPORT_NS = NS
+
+
+def merges_after_ns(settings: BodySettings) -> int:
+    """How long counts of bodies wait for merges, [ns].
+
+    Two beads must stay together for longer than free beads do by chance.
+    """
+    return round(settings.delay * NS)
+
+
+def clusters_after_ns(settings: BodySettings) -> int:
+    """When the bodies and merges of an instant are known that complete its clusters, [ns]."""
+    return merges_after_ns(settings) + _TRANSPORT_NS
+
+
+_BODIES = PipelineSettings().bodies
 
 KNOWN_AFTER_NS: dict[type, int] = {
     # The flights after a contact must be long enough to measure their velocities: 1.5 s at 30
@@ -26,12 +45,11 @@ KNOWN_AFTER_NS: dict[type, int] = {
     PairCollision: 2 * NS,
     # After its last position, until the next flight has begun.
     FreeFlight: 2 * NS,
-    Merge: _MERGE_NS,
-    BodyEstimate: _MERGE_NS,
+    Merge: merges_after_ns(_BODIES),
+    BodyEstimate: merges_after_ns(_BODIES),
     # The middle of a window of up to 3 s of tracks. Speeds by the structure function also wait
     # until the appearance of the beads is known.
     SpeedEstimate: 10 * NS,
-    # Completed by the bodies and merges of the same instant.
-    ClusterEstimate: _MERGE_NS + _TRANSPORT_NS,
+    ClusterEstimate: clusters_after_ns(_BODIES),
 }
-"""Largest delay of each kind of record, [ns]."""
+"""Largest delay of each kind of record, [ns]; with the default setting `bodies.delay`."""

@@ -30,8 +30,9 @@ _PEAKED = 7.0
 # and relative path: 2 in simulated trays 3, 1 in trays 5.
 _DISTURBED = 1.3
 # Collisions that part two neighbours whose distance may vary, per collision of either bead; others
-# leave them beside each other: 0.85 in gases of free beads in tray 3.
-_PARTING = 0.75
+# leave them beside each other: 0.85 in gases of free beads in tray 3. Where beads cover more of
+# the floor, those around a pair keep it together: shares of the floor, and collisions that part.
+_COVERED, _PARTING = (0.25, 0.30), (0.75, 0.5)
 # Heights of the centres of two beads, for mean widths: nodes of a midpoint rule.
 _HEIGHTS = (np.arange(32) + 0.5) / 32
 # Radii at which collision rates are worked out.
@@ -120,6 +121,14 @@ class CollisionRate:
         return np.asarray(deflected * np.interp(radii, self._radii, self._rates))
 
 
+def parting_share(tray: Tray) -> float:
+    """Share of the collisions of two neighbours that part them, while their distance may vary."""
+    radii = np.array([0.5 * species.diameter for species in tray.species])
+    counts = np.array([species.count for species in tray.species], dtype=np.float64)
+    covered = math.pi * (counts @ radii**2) / math.prod(tray.dimensions[:2])
+    return float(np.interp(covered, _COVERED, _PARTING))
+
+
 def _mean_width(radii: NDArray[np.float64], radius: float, height: float) -> NDArray[np.float64]:
     """Mean width within which beads of some radii, (n,), hit one of another radius, [m]."""
     own = (
@@ -132,7 +141,7 @@ def _mean_width(radii: NDArray[np.float64], radius: float, height: float) -> NDA
 
 
 def turning_chance_probability(
-    path: ArrayLike, nearest: ArrayLike, farthest: ArrayLike, collision_rate: ArrayLike
+    path: ArrayLike, nearest: ArrayLike, farthest: ArrayLike, parting_rate: ArrayLike
 ) -> NDArray[np.float64]:
     """Probability that an encounter of two free beads looks like a body of two that turns.
 
@@ -147,8 +156,8 @@ def turning_chance_probability(
         As in `chance_probability`.
     nearest, farthest : array_like, [m]
         Range of their distance in the image.
-    collision_rate : array_like, [1/m]
-        From `CollisionRate`.
+    parting_rate : array_like, [1/m]
+        From `CollisionRate`, times `parting_share`.
 
     Returns
     -------
@@ -156,7 +165,7 @@ def turning_chance_probability(
     """
     a, b = np.asarray(nearest, dtype=np.float64), np.asarray(farthest, dtype=np.float64)
     area = 4.0 * (b - a) * np.sqrt(b**2 - a**2)
-    return _chance(path, area, _PARTING * np.asarray(collision_rate, dtype=np.float64), path)
+    return _chance(path, area, parting_rate, path)
 
 
 def _chance(

@@ -12,6 +12,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     CollisionRate,
     encounter_rate,
     max_chance_probability,
+    parting_share,
 )
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
 from nanorocks_ros.stages.bodies.body_sizes import (
@@ -79,7 +80,9 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         # The outlines of grains differ with their orientation, by more than their places are said
         # to be uncertain: grains beside each other would look bonded.
         self._has_grains = any(kind.properties.shape == 'grain' for kind in tray.species)
-        self._bond_finder = BondFinder(self._encounter_rate, CollisionRate(tray))
+        self._bond_finder = BondFinder(
+            self._encounter_rate, CollisionRate(tray), parting_share(tray)
+        )
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:

@@ -76,15 +76,19 @@ class BondFinder:
         Encounters of a bead per path length, from `encounter_rate`.
     collision_rate : callable
         Collisions of pairs per path: a `CollisionRate`.
+    parting : float
+        Share of these that part a pair: `parting_share`.
     """
 
     def __init__(
         self,
         rate: float,
         collision_rate: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+        parting: float,
     ) -> None:
         self._rate = rate
         self._collision_rate = collision_rate
+        self._parting = parting
         self.clear()
 
     def clear(self) -> None:
@@ -149,7 +153,7 @@ class BondFinder:
             rows[:, TURNING_PATH],
             rows[:, NEAREST],
             farthest,
-            self._collision_rate(rows[:, SMALLER_RADIUS], rows[:, DEFLECTED]),
+            self._parting * self._collision_rate(rows[:, SMALLER_RADIUS], rows[:, DEFLECTED]),
         )
 
     def _new_bonds(self, time: float, max_chance: float) -> list[Bond]:

@@ -29,7 +29,7 @@ from nanorocks_ros.records import (
 from nanorocks_ros.stages.clusters.correlation_width import ClusterAutocorrelator
 from nanorocks_ros.stages.clusters.reading_offset import ReadingOffset
 from nanorocks_ros.stages.clusters.sticking_estimator import StickingEstimator
-from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
+from nanorocks_ros.stages.delays import clusters_after_ns
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
@@ -56,8 +56,8 @@ Clusters = ClusterEstimate | Autocorrelation | Notice
 class ClusterEstimator(RestartingStage[Input, Clusters]):
     """Joins the autocorrelation of a tray image with the bodies and merges of that instant.
 
-    Estimates come two seconds after their instant, so that they do not depend on the order in
-    which records of different kinds come in. An image whose stamp goes back gives out the
+    Estimates come a second after the bodies of their instant, so that they do not depend on the
+    order in which records of different kinds come in. An image whose stamp goes back gives out the
     estimates held so far and starts afresh; merges and speeds start afresh with the first speed
     whose stamp goes back.
 
@@ -82,6 +82,7 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._images = ClusterAutocorrelator(settings, tray)
         self._sticking = StickingEstimator(settings, tray)
+        self._delay_ns = clusters_after_ns(settings.bodies)
         self.reset()
 
     def _restart(self, stamp_ns: int | None = None) -> None:
@@ -123,13 +124,13 @@ class ClusterEstimator(RestartingStage[Input, Clusters]):
                 continue
             estimate = _without_size(result) if wrong_scale else result
             self._held.append((estimate, wrong_scale))
-        known_ns = record.stamp_ns - KNOWN_AFTER_NS[ClusterEstimate]
+        known_ns = record.stamp_ns - self._delay_ns
         while self._held and self._held[0][0].stamp_ns <= known_ns:
             records.append(self._completed(*self._held.popleft()))
         return tuple(records)
 
     def flush(self) -> tuple[ClusterEstimate, ...]:
-        """The estimates of the last two seconds."""
+        """The estimates that are held back."""
         for result in self._images.flush():
             if isinstance(result, ClusterEstimate):
                 self._held.append((result, False))

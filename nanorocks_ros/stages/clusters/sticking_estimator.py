@@ -26,7 +26,7 @@ from nanorocks_ros.records import (
     SpeedEstimate,
 )
 from nanorocks_ros.stages.contacts.bound_beads import bound_since, is_free
-from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
+from nanorocks_ros.stages.delays import clusters_after_ns, merges_after_ns
 from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
@@ -39,12 +39,13 @@ if TYPE_CHECKING:
 
 # Speeds that a cycle needs.
 _FEWEST_SPEEDS = 4
-# Counts of bodies are kept that long; the instants asked for are some seconds ago.
+# Counts of bodies are kept that much longer than the instants asked for lie back.
 _KEPT_NS = 20 * NS
 # Stamps that came over the wire may be rounded.
 _ROUNDING_NS = 1_000_000
 
-# Collisions are known two seconds after they happened, as estimates are.
+# Collisions are known two seconds after they happened, and estimates a second after their instant
+# where `bodies.delay` is 0.
 _COLLISION_NS = NS
 Input = SpeedEstimate | BodyEstimate | Merge | PairCollision
 _stamp = attrgetter('stamp_ns')
@@ -69,9 +70,9 @@ class _Cycle:
 class StickingEstimator(RestartingStage[Input, NoReturn]):
     """Gathers the merges of one tray, cycle by cycle, for the sticking speed as of an instant.
 
-    An estimate of an instant depends only on records of times up to then, and merges known a
-    second later at the latest, in whatever order they came in. A speed whose stamp goes back
-    starts all afresh.
+    An estimate of an instant depends only on records of times up to then, and merges known
+    `bodies.delay` later at the latest, in whatever order they came in. A speed whose stamp goes
+    back starts all afresh.
 
     Parameters
     ----------
@@ -85,6 +86,8 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         self._settings = settings.sticking
         self._tray = tray
         self._delay_ns = round(settings.cooling.delay * NS)
+        self._merges_after_ns = merges_after_ns(settings.bodies)
+        self._kept_ns = clusters_after_ns(settings.bodies) + _KEPT_NS
         self._make_rates: Callable[[], MergeRates] | None = None
         with suppress(NanorocksError):
             # Without a theory of the tray merges are counted, but there is no sticking speed.
@@ -113,8 +116,8 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             insort(cycle.bodies, record, key=_stamp)
             # Half of them at once, for what is left has to move up.
             last_ns = cycle.bodies[-1].stamp_ns
-            if last_ns - cycle.bodies[0].stamp_ns > 2 * _KEPT_NS:
-                del cycle.bodies[: bisect_left(cycle.bodies, last_ns - _KEPT_NS, key=_stamp)]
+            if last_ns - cycle.bodies[0].stamp_ns > 2 * self._kept_ns:
+                del cycle.bodies[: bisect_left(cycle.bodies, last_ns - self._kept_ns, key=_stamp)]
         else:
             cycle.start_ns = record.cycle_start_ns
             cycle.wrong_scale |= bool(record.quality & Quality.WRONG_SCALE)
@@ -190,7 +193,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         return [
             merge
             for merge in cycle.merges
-            if merge.stamp_ns <= last_ns and merge.known_ns <= last_ns + KNOWN_AFTER_NS[Merge]
+            if merge.stamp_ns <= last_ns and merge.known_ns <= last_ns + self._merges_after_ns
         ]
 
     def _cycle_until(self, cycle: int, stamp_ns: int) -> StickingCycle | None:

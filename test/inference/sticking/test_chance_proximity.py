@@ -13,6 +13,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     encounter_rate,
     expected_encounters,
     max_chance_probability,
+    parting_share,
     turning_chance_probability,
 )
 
@@ -62,6 +63,12 @@ def test_in_one_layer_a_bead_sweeps_twice_the_sum_of_the_radii():
     rate = CollisionRate(layer)(np.array([1e-3]), np.ones(1))[0]
     # 14 others, sides less a diameter of 13 mm, mean relative speed (pi / 2)^(1/2).
     assert rate == pytest.approx(np.sqrt(0.5 * np.pi) * 14 * 4e-3 / 13e-3**2, rel=1e-6)
+
+
+def test_collisions_part_fewer_pairs_where_beads_cover_more_of_the_floor():
+    trays = load_trays()
+    assert parting_share(trays[5]) < 0.7 * parting_share(trays[3])
+    assert parting_share(trays[3]) == pytest.approx(parting_share(trays[1]), rel=0.01)
 
 
 def test_the_false_alarm_rate_is_divided_among_all_encounters_of_a_cycle():

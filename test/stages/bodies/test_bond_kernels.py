@@ -37,7 +37,7 @@ def _pushed(finder, motion, start, frames):
 @pytest.fixture
 def finder():
     # So many encounters per metre that every pair that stays together is a bond.
-    return BondFinder(1e6, lambda radii, _: np.full_like(radii, 1e6))
+    return BondFinder(1e6, lambda radii, _: np.full_like(radii, 1e6), 1.0)
 
 
 @pytest.mark.parametrize(('speed', 'breaks'), [(0.0, False), (3e-3, True)])

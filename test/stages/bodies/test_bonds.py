@@ -27,7 +27,7 @@ def _beads(positions, speed=1e-3):
 @pytest.mark.parametrize('odd', [0, 1])
 def test_a_broken_bond_is_reported_while_other_pairs_meet(odd):
     # So many encounters per metre that every pair that stays together is a bond.
-    finder = BondFinder(1e6, lambda radii, _: np.full_like(radii, 1e6))
+    finder = BondFinder(1e6, lambda radii, _: np.full_like(radii, 1e6), 1.0)
     bonds, broken = [], []
     for number in range(60):
         # The first two meet in every other frame.
@@ -44,7 +44,7 @@ def test_a_broken_bond_is_reported_while_other_pairs_meet(odd):
 @pytest.mark.parametrize(('hidden', 'bonds'), [(True, []), (False, [(0, 1)])])
 def test_time_in_which_a_bead_is_hidden_is_no_time_beside_each_other(hidden, bonds):
     # Encounters and collisions as in tray 5; free beads part within some hundredths of a second.
-    finder = BondFinder(1e3, lambda radii, _: np.full_like(radii, 1e3))
+    finder = BondFinder(1e3, lambda radii, _: np.full_like(radii, 1e3), 1.0)
     positions, bonded = [(0.0, 0.0), (2.0 * RADIUS, 0.0)], []
     for number in range(30):
         seen = 1 if hidden and 2 <= number < 28 else 2
@@ -56,7 +56,7 @@ def test_time_in_which_a_bead_is_hidden_is_no_time_beside_each_other(hidden, bon
 @pytest.mark.parametrize(('cools', 'bonds'), [(True, []), (False, [(0, 1)])])
 def test_a_gas_that_came_to_rest_parts_no_pair(cools, bonds):
     # The first velocities of beads at rest are those of noise: 10 mm/s, then 0.1.
-    finder = BondFinder(1e3, lambda radii, _: np.full_like(radii, 1e3))
+    finder = BondFinder(1e3, lambda radii, _: np.full_like(radii, 1e3), 1.0)
     positions, bonded = [(0.0, 0.0), (2.0 * RADIUS, 0.0)], []
     for number in range(30):
         speed = 1e-4 if cools and number > 1 else 1e-2

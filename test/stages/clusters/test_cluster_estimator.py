@@ -21,7 +21,7 @@ from nanorocks_ros.records import (
     StickingStatus,
     TrayImage,
 )
-from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.clusters.cluster_estimator import ClusterEstimator
 
 
@@ -50,9 +50,11 @@ def as_they_come(records, delays):
     return sorted(records, key=known_ns)
 
 
-def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
-    stage = ClusterEstimator(PipelineSettings(), TRAY)
-    records = as_they_come([*cooling(until=12.0), *images(12.0)], {BodyEstimate: 1.0})
+@pytest.mark.parametrize('delay', [2.0, PipelineSettings().bodies.delay])
+def test_estimates_come_a_second_after_what_tracks_say_of_the_instant(delay):
+    settings = with_values(PipelineSettings(), {'bodies.delay': delay}, 'test')
+    stage = ClusterEstimator(settings, TRAY)
+    records = as_they_come([*cooling(until=20.0), *images(20.0)], {BodyEstimate: delay})
     true = {
         record.stamp_ns: record.bodies.value
         for record in records
@@ -64,7 +66,7 @@ def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
         for item in stage.push(record):
             if isinstance(item, ClusterEstimate):
                 seen += 1
-                assert record.stamp_ns - item.stamp_ns >= 2 * NS
+                assert record.stamp_ns - item.stamp_ns >= (delay + 1.0) * NS
                 assert item.bodies.value == true[item.stamp_ns]
                 assert math.isnan(item.onset) == (item.stamp_ns < first * NS)
     assert seen > 40
@@ -76,8 +78,9 @@ def test_estimates_come_two_seconds_later_with_what_tracks_say_of_the_instant():
 
 def test_they_do_not_depend_on_the_order_in_which_records_come_in():
     records = [*cooling(until=12.0), *images(12.0)]
-    estimate = estimates(as_they_come(records, {BodyEstimate: 1.0}))
-    other = estimates(as_they_come(records, {BodyEstimate: 1.6, Merge: 0.9}))
+    delay = PipelineSettings().bodies.delay
+    estimate = estimates(as_they_come(records, {BodyEstimate: delay}))
+    other = estimates(as_they_come(records, {BodyEstimate: delay + 0.6, Merge: 0.9}))
     assert [repr(item) for item in estimate] == [repr(record) for record in other]
 
 

@@ -29,7 +29,8 @@ def test_the_onset_is_that_of_the_first_merge_once_it_happened():
 
 
 def test_a_merge_that_became_known_too_late_changes_nothing_said_of_before():
-    stage = meter([*cooling(sticking=0.0), merge(5.0, 1, known=3.0)])
+    delay = PipelineSettings().bodies.delay
+    stage = meter([*cooling(sticking=0.0), merge(5.0, 1, known=delay + 2.0)])
     assert stage.onset(1, ns(6.0)) is None
     assert stage.onset(1, ns(7.1)) == pytest.approx(5.0)
 
