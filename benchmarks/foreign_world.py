@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import chisquare
 
 from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
 from benchmarks.film_measurement import DECADES, FilmResult, is_flagged
@@ -35,6 +36,8 @@ _TRAYS = (1, 3, 5, 7)
 _HALF_WIDTHS = 3.0
 # Half of an interval of 95 % in standard deviations.
 _SIGMAS = 1.96
+# Parts of a posterior below the limits of its intervals of 95 and 68 %, and its median.
+_QUANTILES = (0.0, 0.025, 0.16, 0.5, 0.84, 0.975, 1.0)
 # Factor within which stated errors count as right.
 _FACTOR = 1.5
 
@@ -78,6 +81,8 @@ def print_drawn(read: list[ReadFilm]) -> None:
     """Print what is measured in drawn films, tray by tray."""
     print('\nDrawn films: restitutions of the unflagged final estimates\n')
     print_restitutions(read)
+    print('\nDrawn films: truths between the quantiles of the posterior\n')
+    print_ranks(read)
     print('\nDrawn films: restitution of beads by contacts alone, in flagged films, too\n')
     print_contacts(read)
     print('\nDrawn films: measured over true; speeds by true mean projected speed in mm/s\n')
@@ -104,6 +109,36 @@ def print_restitutions(read: list[ReadFilm]) -> None:
     print('| --- ' * 12 + '|')
     for tray, films in _by_tray(read).items():
         print(_restitution_row(tray, films))
+
+
+def print_ranks(read: list[ReadFilm]) -> None:
+    """Print how many truths lie between the quantiles of unflagged posteriors, tray by tray.
+
+    Rank statistics in six bins: as many as their widths say if posteriors are right.
+    """
+    bins = ' | '.join(f'{100 * low:g} to {100 * high:g} %' for low, high in pairwise(_QUANTILES))
+    print(f'| tray | of | films | {bins} | χ² p |')
+    print('| --- ' * (3 + len(_QUANTILES)) + '|')
+    by_tray = {str(tray): films for tray, films in _by_tray(read).items()}
+    for name, films in [*by_tray.items(), ('all', read)]:
+        final = [film for film in films if film.is_unflagged]
+        for truth, field in (('beads', 'restitution'), ('walls', 'wall_restitution')):
+            print(f'| {name} | {truth} {_rank_cells(final, truth, field)}|')
+
+
+def _rank_cells(films: list[ReadFilm], truth: str, field: str) -> str:
+    counts = np.zeros(len(_QUANTILES) - 1, dtype=np.int64)
+    for film in films:
+        wide, narrow = (
+            getattr(cycles[0], field) for cycles in (film.result.cycles, film.result.sure)
+        )
+        limits = (wide.lower, narrow.lower, wide.value, narrow.upper, wide.upper)
+        if np.isfinite(limits).all():
+            counts[np.searchsorted(limits, getattr(film.film, truth))] += 1
+    row = f'| {counts.sum()} ' + ''.join(f'| {count} ' for count in counts)
+    if not counts.any():
+        return row + '| '
+    return row + f'| {chisquare(counts, counts.sum() * np.diff(_QUANTILES)).pvalue:.2g} '
 
 
 def print_contacts(read: list[ReadFilm]) -> None:
