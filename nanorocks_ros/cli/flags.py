@@ -32,6 +32,11 @@ SettingsType = TypeVar('SettingsType')
 _LOGGER = logging.getLogger(__name__)
 _SWITCH = 'on', 'off'
 _EMPTY = 'empty'
+SHORT_FLAGS = {
+    f'preprocess.{name}': f'--{name.replace("_", "-")}'
+    for name in ('layout', 'pixels_per_metre', 'regions_px')
+}
+"""Shorter flags of settings that describe a film; those by their names do as well."""
 
 
 def add_flags(
@@ -60,15 +65,14 @@ def add_flags(
             )
 
 
-def add_flag(
-    group: Any, row: SettingRow, default: str, flags: tuple[str, ...] = ()
-) -> argparse.Action:
-    """Add the flag of one setting; `flags` in place of that of its name."""
+def add_flag(group: Any, row: SettingRow, default: str) -> argparse.Action:
+    """Add the flag of one setting."""
     unit = f' [{row.unit}]' if row.unit else ''
     # What an empty value means stands in the text already.
     told = '' if default == _EMPTY and f'{_EMPTY}: ' in row.doc else f'; default {default}'
     action: argparse.Action = group.add_argument(
-        *(flags or (flag_of(row.name),)),
+        *([SHORT_FLAGS[row.name]] if row.name in SHORT_FLAGS else []),
+        flag_of(row.name),
         dest=row.name,
         metavar=_placeholder(row),
         nargs='*' if isinstance(row.default, tuple) else None,

@@ -26,6 +26,11 @@ def parameter_file(folder, text):
     return str(path)
 
 
+@pytest.mark.parametrize('flag', ['--pixels-per-metre', '--preprocess-pixels-per-metre'])
+def test_the_scale_of_a_film_has_a_short_flag_too(flag):
+    assert settings(flag, '9000').preprocess.pixels_per_metre == 9000.0
+
+
 def test_the_flag_of_an_old_name_sets_the_setting_and_is_logged(caplog):
     with caplog.at_level(logging.WARNING):
         assert settings('--tracking-fastest', '0.1').tracking.max_speed == 0.1

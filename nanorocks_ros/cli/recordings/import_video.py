@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nanorocks_ros.cli.flags import add_flag, flag_of, settings_from
+from nanorocks_ros.cli.flags import SHORT_FLAGS, add_flag, settings_from
 from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
 from nanorocks_ros.settings import PipelineSettings, rows
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from nanorocks_ros.studies.film_import.import_each import ImportBatch
     from nanorocks_ros.studies.film_import.import_result import ImportResult
 
-# Flags of this command for settings of the pipeline; their names in `analyse` do as well.
-_EXPERIMENT = {
-    'trays': '--trays',
-    'trays_file': '--trays-file',
-    'preprocess.layout': '--layout',
-    'preprocess.pixels_per_metre': '--pixels-per-metre',
-    'preprocess.regions_px': '--regions-px',
-}
+# Settings of the pipeline that describe what a film shows.
+_EXPERIMENT = (
+    'trays',
+    'trays_file',
+    'preprocess.layout',
+    'preprocess.pixels_per_metre',
+    'preprocess.regions_px',
+)
 # Number of skipped files that are named in the notice.
 _NAMED = 3
 
@@ -75,9 +75,8 @@ def add_parser(commands: Any) -> None:
 def _add_experiment(group: Any) -> None:
     """Flags of `nanorocks analyse`, which then needs them no more."""
     by_name = {row.name: row for row in rows(PipelineSettings())}
-    for name, own_flag in _EXPERIMENT.items():
-        row = by_name[name]
-        add_flag(group, row, 'not stated', tuple(dict.fromkeys((own_flag, flag_of(name)))))
+    for name in _EXPERIMENT:
+        add_flag(group, by_name[name], 'not stated')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -129,7 +128,7 @@ def _experiment(options: argparse.Namespace) -> dict[str, str]:
         values['preprocess.calibration'] = options.calibration
         for name in told - {'trays', 'trays_file'}:
             raise ConfigurationError(
-                _EXPERIMENT[name], 'is part of the --calibration', 'leave out one of them'
+                SHORT_FLAGS[name], 'is part of the --calibration', 'leave out one of them'
             )
     trays = load_trays(settings.trays_file)
     for number in values.get('trays', ()):
