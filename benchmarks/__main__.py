@@ -53,6 +53,7 @@ ALL = (
     'cor_recovery',
     'cor_films',
     'valley',
+    'swinging_trays',
     'species_decays',
     'closed_forms',
     'contacts',

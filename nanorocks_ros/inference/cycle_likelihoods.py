@@ -12,6 +12,7 @@ import numpy as np
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.decay.decay_likelihood import NUISANCE_COUNT
 from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
 from nanorocks_ros.inference.flights.flight_losses import flight_table
 from nanorocks_ros.records import (
@@ -120,6 +121,9 @@ class CycleLikelihoods:
                 for number, friction in enumerate(arrays['frictions'])
             )
             # Another version may have compared other nuisances.
+            decay = _decay_from(arrays, 'decay')
+            if decay.gradient.shape[-1] != NUISANCE_COUNT:
+                raise FitError(where, 'was made with other nuisances', _NOT_THERE)
             none = ContactTerms.of(())
             contacts = ContactTerms(
                 rebounds=int(arrays['contacts.rebounds']),
@@ -134,7 +138,7 @@ class CycleLikelihoods:
             )
             return cls(
                 cycles=cycles,
-                decay=replace(_decay_from(arrays, 'decay'), rough=rough),
+                decay=replace(decay, rough=rough),
                 contacts=contacts,
                 flights=arrays['flights'],
                 by_form=by_form,

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from nanorocks_ros.inference.decay.decay_library import NUISANCES
 from nanorocks_ros.inference.decay.grid_likelihood import SCALES, DecayLikelihood
 from nanorocks_ros.inference.decay.likelihood_kernels import ROUNDING, evaluate
 from nanorocks_ros.records import Measured
@@ -38,18 +39,21 @@ _EVERY = 4
 # A scale with a larger error is not linear: it is sampled at `SCALES`.
 _WIDE = 0.1
 # Nuisances of the camera, beside those of the library: scale of lengths, and a relative error of
-# the speeds that grows with their logarithm. The error of the drag is one more.
+# the speeds that grows with their logarithm. The errors of the drag and of the start are two more.
 CAMERA_NUISANCES = ('scale', 'speed_bias')
 _NO_DRAG = Measured(0.0, 0.0)
+NUISANCE_COUNT = 1 + len(NUISANCES) + len(CAMERA_NUISANCES) + 2
+"""Nuisances of smooth beads: floor and lid, those of library and camera, drag and start."""
 
 
 class _Unknowns(NamedTuple):
-    """Standard deviations of the `CAMERA_NUISANCES`; drag and its error, [1/s]."""
+    """Deviations of the `CAMERA_NUISANCES`; drag and its error, [1/s]; that of the start, [s]."""
 
     scale: float
     speed_bias: float
     drag: float
     drag_error: float
+    start_error: float
 
 
 def decay_likelihood(
@@ -60,6 +64,7 @@ def decay_likelihood(
     camera: tuple[float, float],
     drag: Measured = _NO_DRAG,
     highest_friction: float = math.inf,
+    start_error: float = 0.0,
 ) -> DecayLikelihood:
     """The likelihood of one decay over the grid.
 
@@ -70,8 +75,8 @@ def decay_likelihood(
     ----------
     tables : DecayTables
     time : ndarray (n,), [s], > 0
-        Since the shaking event; rising. Times beyond the range of the library, counted from the
-        first, are left out.
+        Since the gas began to cool; rising. Times beyond the range of the library, counted from
+        the first, are left out.
     speed, error : ndarray (n,), [m/s], > 0
         Mean projected speeds and one standard error of each.
     camera : tuple of 2 floats
@@ -81,6 +86,8 @@ def decay_likelihood(
     highest_friction : float
         Decays are compared at frictions up to the next one above it, which saves time; at 0 as
         those of smooth beads alone.
+    start_error : float, [s]
+        Standard error of the moment from which the times count.
     """
     library = tables.decays
     time, speed, error = undragged(time, speed, error, drag.value)
@@ -93,7 +100,7 @@ def decay_likelihood(
     # strength of the fluctuations is known too roughly to determine restitutions.
     subset = slice(None, None, _EVERY)
     corners, shares = tables.corners[subset], tables.shares[subset]
-    unknowns = _Unknowns(*camera, drag.value, drag.error)
+    unknowns = _Unknowns(*camera, drag.value, drag.error, start_error)
     first = _over(tables, data, cells, unknowns, (subset, corners, shares), derivatives=False)
     best = int(np.argmax(first.log_likelihood)) * _EVERY
     all_places = slice(None), tables.corners[best, np.newaxis], tables.shares[best, np.newaxis]
@@ -172,7 +179,7 @@ def _over(
     library = tables.decays
     subset, corners, shares = places
     mean = tables.mean[subset]
-    n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES) + 1
+    n_z = tables.slopes.shape[1] + len(CAMERA_NUISANCES) + 2
     numbers = np.empty((len(mean), 3))
     gradient = np.empty((len(mean) if derivatives else 0, n_z))
     information = np.empty((len(gradient), n_z, n_z))

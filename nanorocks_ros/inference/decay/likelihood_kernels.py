@@ -57,8 +57,9 @@ def evaluate(
     corners, shares : ndarray (n_places or 1, 4)
         One for all points, or one for each.
     means, slopes : ndarray (n_places, n_x), (n_places, n_z, n_x)
-    camera : ndarray (4,)
-        Standard deviations of scale and bias; drag and its standard deviation, [1/s].
+    camera : ndarray (5,)
+        Standard deviations of scale and bias; drag and its standard deviation, [1/s]; standard
+        deviation of the moment from which the times count, [s].
     start : tuple of 2 floats
         Mean and standard deviation of ln a before the decay is seen; wider where the first speeds
         are far off.
@@ -66,7 +67,7 @@ def evaluate(
         Logarithm of the first distance of the library, and its step.
     results : tuple of 3 ndarrays
         Log likelihood, deviation and start of `DecayLikelihood`, (n_places, 3); gradient,
-        (n_places, n_z + 3), and information, (n_places, n_z + 3, n_z + 3): empty if not needed.
+        (n_places, n_z + 4), and information, (n_places, n_z + 4, n_z + 4): empty if not needed.
     """
     log_time, log_speed, variance = data
     numbers, gradients, informations = results
@@ -76,7 +77,7 @@ def evaluate(
     surprise = abs(log_speed[0] + _LEAD - expected) - _SURPRISE * spread
     spread = math.hypot(spread, max(surprise, 0.0))
     n = log_time.size
-    n_z = slopes.shape[1] + 3
+    n_z = slopes.shape[1] + 4
     mixed = np.empty(covariances.shape[1:])
     factor = np.empty((n, n))
     # Columns: residual, derivative with ln a, then the nuisances; whitened in place.
@@ -107,9 +108,10 @@ def evaluate(
         _compare(log_time, log_speed, means[place], first, step, best, columns)
         offset = (best - first) / step
         _look_up(slopes[place], log_time / step + offset, columns[2:])
-        columns[n_z - 1] = camera[0] * (columns[1] - 1.0)
-        columns[n_z] = camera[1] * (log_speed - middle)
-        _drag_column(log_time, camera[2], camera[3], columns[1], columns[n_z + 1])
+        columns[n_z - 2] = camera[0] * (columns[1] - 1.0)
+        columns[n_z - 1] = camera[1] * (log_speed - middle)
+        _drag_column(log_time, camera[2], camera[3], columns[1], columns[n_z])
+        _start_column(log_time, camera[2], camera[4], columns[1], columns[n_z + 1])
         whiten(factor, columns, 2 + n_z)
         _sum_up(
             columns, (deviation, spread), numbers[place], gradients[place], informations[place]
@@ -140,6 +142,23 @@ def _drag_column(
             time = -math.log1p(-x) / drag
             later = (time * (1.0 - x) - s) / x
         column[i] = error * ((slope[i] - 1.0) * later - time)
+
+
+@kernel
+def _start_column(
+    log_time: NDArray[np.float64],
+    drag: float,
+    error: float,
+    slope: NDArray[np.float64],
+    column: NDArray[np.float64],
+) -> None:
+    """Change of the expected ln w at a time s, where the gas began to cool one `error` later.
+
+    Times are shorter then, so that s falls by 1 - drag s, and less drag has slowed the gas.
+    """
+    for i in range(log_time.size):
+        s = math.exp(log_time[i])
+        column[i] = error * (drag + (1.0 - slope[i]) * (1.0 - min(drag * s, 1.0)) / s)
 
 
 @kernel

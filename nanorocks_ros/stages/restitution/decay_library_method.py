@@ -157,12 +157,13 @@ class DecayLibraryMethod:
         known = decay or _ANY_DECAY
         likelihood = decay_likelihood(
             self._tables,
-            known.time,
+            known.age.value + known.time,
             known.speed,
             known.error,
             self._camera[known.of_grains],
             self._drag_of_gas(losses.slowing.drag),
             highest,
+            known.age.error,
         )
         return likelihood.emptied() if decay is None else likelihood
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.decay.cooling_age import cooling_age
 from nanorocks_ros.records import (
     NS,
     UNKNOWN,
@@ -203,7 +204,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         return speed.tray_speed > calm
 
     def _start_ns(self, first: SpeedEstimate) -> int:
-        """When the gas began to cool, by the first speed used."""
+        """When the gas began to cool freely, by the first speed used."""
         shake_ns = first.cycle_start_ns or 0
         # A tray that went on oscillating drove the gas until shortly before the window.
         late_ns = first.stamp_ns - shake_ns - round(self._settings.delay * NS)
@@ -312,12 +313,14 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
         return reduce(or_, [flag for flag, is_set in flags.items() if is_set], Quality(0))
 
     def _decay(self, samples: list[SpeedEstimate], start_ns: int) -> Decay:
-        """The speeds of the cycle, with times since the gas began to cool."""
+        """The speeds of the cycle, with times since the gas began to cool freely."""
+        shake_ns = samples[0].cycle_start_ns or 0
         return Decay(
             time=np.array([(sample.stamp_ns - start_ns) / NS for sample in samples]),
             speed=np.array([sample.mean_projected_speed.value for sample in samples]),
             error=np.array([sample.mean_projected_speed.error for sample in samples]),
             of_grains=self._grains,
+            age=cooling_age((start_ns - shake_ns) / NS),
         )
 
     def _cycle_restitution(

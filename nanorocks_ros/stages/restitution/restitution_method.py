@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from nanorocks_ros.records import Measured
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -17,6 +19,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import CorRelation
     from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
 
+NO_AGE = Measured(0.0, 0.0)
+"""Of a gas that was shaken at time 0."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decay:
@@ -25,16 +30,19 @@ class Decay:
     Parameters
     ----------
     time : ndarray (n,), [s]
-        Since the shaking event.
+        Since the shaking event or, where that was later, since the tray had come to rest.
     speed, error : ndarray (n,), [m/s]
     of_grains : bool
         Whether there are grains among the beads.
+    age : Measured, [s]
+        For which the gas had cooled before time 0.
     """
 
     time: NDArray[np.float64]
     speed: NDArray[np.float64]
     error: NDArray[np.float64]
     of_grains: bool = False
+    age: Measured = NO_AGE
 
 
 class Contacts(Protocol):

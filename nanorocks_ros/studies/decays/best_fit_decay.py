@@ -12,6 +12,7 @@ import numpy as np
 from scipy import optimize
 
 from nanorocks_ros.errors import FitError
+from nanorocks_ros.inference.decay.cooling_age import cooling_age
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import DecayTables, tables_of
@@ -46,7 +47,7 @@ class LibraryDecay:
         Mean projected speed for the likeliest restitutions, with the likeliest tray, start and
         camera within their priors.
     initial_speed : float, [m/s]
-        Mean projected speed when the gas began to cool.
+        Mean projected speed when the gas began to cool; on a tray that swung, by `cooling_age`.
     restitution, wall_restitution : tuple of 3 floats
         Median, lower and upper end of the 95 % interval, from all cycles with the default
         priors.
@@ -75,7 +76,7 @@ def library_decay(
     curve : SpeedCurve
         Mean of the cycles over the times that are used.
     start : float, [s]
-        When the gas begins to cool, since the shaking event.
+        When the gas begins to cool freely, since the shaking event.
     walls : tuple of 2 floats, optional
         Ends of the flat prior of the wall restitution; the default one if not given.
 
@@ -92,14 +93,16 @@ def library_decay(
     camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
     # As the restitution stage: the first part still depends on the shaking.
     first = max(float(curve.times[0]), start + PipelineSettings().cooling.delay)
+    age = cooling_age(start)
+    began = start - age.value
     likelihoods = []
     for cycle in cycles:
         in_window = (cycle.times >= first - 1e-9) & (cycle.times <= curve.times[-1] + 1e-9)
         in_window &= cycle.error > 0.0
         if in_window.sum() < 4:
             raise FitError(f'cycle {cycle.cycle}', 'is too short', 'choose a longer time')
-        decay = cycle.times[in_window] - start, cycle.speed[in_window], cycle.error[in_window]
-        likelihoods.append(decay_likelihood(tables, *decay, camera))
+        decay = cycle.times[in_window] - began, cycle.speed[in_window], cycle.error[in_window]
+        likelihoods.append(decay_likelihood(tables, *decay, camera, start_error=age.error))
     together = reduce(add, likelihoods)
     integrated = together.integrated()
     low, high = walls or (prior.min_wall_restitution, prior.max_wall_restitution)
@@ -113,7 +116,7 @@ def library_decay(
     beads, sides = posterior.quantiles(ends), posterior.wall_quantiles(ends)
     cooling = curve.times >= first - 1e-9
     speed, initial = _best_decay(
-        tables, together, possible, curve.times[cooling] - start, curve.speed[cooling], camera
+        tables, together, possible, curve.times[cooling] - began, curve.speed[cooling], camera
     )
     return LibraryDecay(
         times=curve.times[cooling],

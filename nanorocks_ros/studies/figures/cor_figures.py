@@ -17,6 +17,7 @@ import numpy as np
 
 from nanorocks_ros.errors import ConfigurationError, FitError, RecordingError
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.decay.cooling_age import cooling_age
 from nanorocks_ros.outputs.unfinished_files import holds_files
 from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
 from nanorocks_ros.studies.decays.best_fit_decay import library_decay
@@ -191,7 +192,7 @@ def cor_figures(
         ),
         'instantaneous': _instantaneous(folder / SPEED, data, reports),
     }
-    cycles, span = cooling_part(data.cycles, data.span, data.start)
+    cycles, span = cooling_part(data.cycles, data.span, _began(data))
     cooling = mean_cycle(cycles, *span)
     for name, plan in plans.items():
         values[name] = _map(folder, name, plan, cooling, workers, reports)
@@ -216,7 +217,7 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
         {'tray': data.tray.number, 'seed': search.seed, 'mean_speed': mean_speed},
         'search',
     )
-    last = float(f'{_DURATION_FACTOR * (data.span[1] - data.start):.6g}')
+    last = float(f'{_DURATION_FACTOR * (data.span[1] - _began(data)):.6g}')
     times = [last * k / (_TIMES - 1) for k in range(_TIMES)]
     walls = {'restitution': search.beads, 'wall_restitution': search.walls}
     # Made first, since it checks the restitutions.
@@ -237,6 +238,11 @@ def search_plans(search: Search, data: CorData, curve: SpeedCurve) -> dict[str, 
     fixed = with_values(settings, {'wall_restitution': data.wall_restitution}, 'search')
     widths = {'restitution': possible, 'restitution_width': search.widths}
     return {**plans, 'width': sweep_plan(fixed, widths, times, search.runs, keep_runs=True)}
+
+
+def _began(data: CorData) -> float:
+    """When a gas at rest would have begun to cool, since the shaking event, [s]."""
+    return data.start - cooling_age(data.start).value
 
 
 def _initial_speed(data: CorData, curve: SpeedCurve, walls: tuple[float, float]) -> float:

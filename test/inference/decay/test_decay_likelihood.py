@@ -148,10 +148,36 @@ def test_the_gradient_by_the_drag_is_that_of_likelihoods_for_other_drags(tables,
     other = beads * tables.wall_restitution.size + walls
     high, low = (at(drag + sign * step).log_likelihood for sign in (1.0, -1.0))
     slopes = (high - low) / (2.0 * step) * error
-    gradient = at(drag).gradient[:, -1]
+    gradient = at(drag).gradient[:, -2]
     expected = slopes[best] - slopes[other]
     assert abs(expected) > 5.0
     assert gradient[best] - gradient[other] == pytest.approx(expected, rel=0.25)
+
+
+@pytest.mark.parametrize('drag', [0.0, 0.03])
+def test_the_gradient_by_the_start_is_that_of_likelihoods_for_other_starts(tables, drag):
+    # Late times that fill equally many bins however they are counted.
+    time = np.arange(12.0, 24.0, 0.25)
+    speeds = 6e-3 / (1.0 + time / 4.0)
+    error, step = 0.5, 0.05
+
+    def at(later):
+        measured, camera = Measured(drag, 0.0), (0.0, 0.0)
+        decay = time - later, speeds, 0.05 * speeds
+        return decay_likelihood(
+            tables, *decay, camera, measured, highest_friction=0.0, start_error=error
+        )
+
+    unmoved, early, late = at(0.0), at(-step), at(step)
+    assert early.samples == unmoved.samples == late.samples
+    slopes = (late.log_likelihood - early.log_likelihood) / (2.0 * step) * error
+    gradient = unmoved.gradient[:, -1]
+    # The best place, and two that are less likely: only differences count.
+    best, unlikely, other = np.argsort(-unmoved.log_likelihood)[[0, 300, 400]]
+    for place in (unlikely, other):
+        expected = slopes[place] - slopes[best]
+        assert abs(expected) > 1.0
+        assert gradient[place] - gradient[best] == pytest.approx(expected, rel=0.1)
 
 
 @pytest.mark.parametrize('faster', [1.0 / 30.0, 30.0])

@@ -67,13 +67,14 @@ def test_it_says_of_a_cycle_what_the_stage_says(cycles):
     assert decay.wall_restitution[0] == pytest.approx(final.wall_restitution.value, abs=2e-3)
 
 
-def test_a_gas_that_began_to_cool_later_is_the_same_gas(cycles):
-    later = [replace(cycle, times=cycle.times + 4.0) for cycle in cycles]
-    decay = library_decay(TRAY, cycles, mean_cycle(cycles, 1.75, 20.0))
-    same = library_decay(TRAY, later, mean_cycle(later, 5.75, 24.0), start=4.0)
-    assert same.restitution == pytest.approx(decay.restitution, abs=1e-6)
-    assert same.initial_speed == pytest.approx(decay.initial_speed, rel=1e-6)
-    np.testing.assert_allclose(same.times - 4.0, decay.times)
+def test_a_gas_on_a_tray_that_swung_is_nearly_as_old_as_one_at_rest(cycles):
+    curve = mean_cycle(cycles, 5.75, 20.0)
+    still = library_decay(TRAY, cycles, curve)
+    swung = library_decay(TRAY, cycles, curve, start=4.0)
+    np.testing.assert_array_equal(swung.times, still.times)
+    lower, upper = still.restitution[1:]
+    assert swung.restitution[0] == pytest.approx(still.restitution[0], abs=0.1 * (upper - lower))
+    assert swung.initial_speed == pytest.approx(still.initial_speed, rel=0.15)
 
 
 def test_a_tray_without_a_library_and_a_decay_too_short_are_named(cycles):
