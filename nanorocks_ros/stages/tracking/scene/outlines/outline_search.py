@@ -58,15 +58,14 @@ def search_outlines(
         1 where something moves: discs that are smeared there are found, too.
     """
     expected = np.empty((0, 3)) if hints is None else hints
-    centres = centres_of_all_sizes(picture, voting, _LEAST_VOTES)
     at_hints = fit_outlines(picture, expected, voting)
     sure = at_hints.discs[are_sure(at_hints, voting.step)]
-    if len(sure):
-        apart_from_sure = cKDTree(sure[:, :2]).query(centres[:, :2])[0]
-        centres = centres[apart_from_sure > _SAME_SHARE * voting.smallest]
+    centres = _away(centres_of_all_sizes(picture, voting, _LEAST_VOTES), sure, voting)
     starts, votes = centres[:, :3], centres[:, 3]
     at_starts = fit_outlines(picture, starts, voting)
-    beside = _beside(starts[(votes > _SOFT_VOTES) & ~are_sure(at_starts, voting.step)])
+    surely = are_sure(at_starts, voting.step)
+    sure = np.concatenate([sure, at_starts.discs[surely]])
+    beside = _away(_beside(starts[(votes > _SOFT_VOTES) & ~surely]), sure, voting)
     at_beside = fit_outlines(picture, beside, voting)
     # A smeared bead has wide edges, too, but no whole outline.
     whole = at_beside.support >= _WHOLE_SUPPORT
@@ -86,6 +85,16 @@ def are_sure(outlines: Outlines, usual: float) -> NDArray[np.bool_]:
     """Which outlines show well, by the usual step."""
     sure = outlines.support >= _SURE_SUPPORT
     return np.asarray(sure & (outlines.steps >= _SURE_STEP * usual))
+
+
+def _away(
+    places: NDArray[np.float64], sure: NDArray[np.float64], voting: Voting
+) -> NDArray[np.float64]:
+    """Places that are not those of discs that show well."""
+    if len(sure) == 0 or len(places) == 0:
+        return places
+    near = cKDTree(sure[:, :2]).query(places[:, :2])[0]
+    return np.asarray(places[near > _SAME_SHARE * voting.smallest])
 
 
 def _beside(starts: NDArray[np.float64]) -> NDArray[np.float64]:
