@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import have_near
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -68,11 +70,28 @@ class KnownBeads:
         self, colours: NDArray[np.float64], radii: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Distance of discs with colours (n, 3) and radii (n,) to known beads, in spreads."""
+        features = np.column_stack([colours, np.log(radii)]) / self.spreads
+        return np.asarray(self.tree.query(features, k=[self._nearest])[0][:, 0])
+
+    def are_near(
+        self,
+        colours: NDArray[np.float64],
+        radii: NDArray[np.float64],
+        limits: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Which discs are nearer than limits (n,) to known beads, in spreads, by `distances`."""
+        features = np.column_stack([colours, np.log(radii)]) / self.spreads
+        near = np.empty(len(features), dtype=bool)
+        # Most discs are beads, near to many: a search for the nearest ones would take longer.
+        have_near(features, self.tree.data, limits, self._nearest, near)
+        return near
+
+    @property
+    def _nearest(self) -> int:
+        """Number of the known bead that counts, from the nearest on."""
         # Not the nearest: what was taken for a bead by mistake is known, too.
         least = 2 if self.tree.n >= _MANY else 1
-        nearest = max(least, round(_KNOWN_SHARE * self.tree.n))
-        features = np.column_stack([colours, np.log(radii)]) / self.spreads
-        return np.asarray(self.tree.query(features, k=[nearest])[0][:, 0])
+        return max(least, round(_KNOWN_SHARE * self.tree.n))
 
     def have_size(self, radii: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether radii (n,) are those of beads: light and shadow change colours, not sizes."""

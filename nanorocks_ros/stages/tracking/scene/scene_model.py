@@ -197,9 +197,8 @@ class SceneModel:
         if self._known is None:
             return np.asarray(told)
         radii = candidates.outlines.discs[:, 2]
-        distances = self._known.distances(candidates.colours, radii)
-        rest = candidates.moving < MOVING_SHARE
-        near = distances < np.where(rest, ALIKE, _ALIKE_MOVING)
+        limits = np.where(candidates.moving < MOVING_SHARE, ALIKE, _ALIKE_MOVING)
+        near = self._known.are_near(candidates.colours, radii, limits)
         near &= self._at_rest.allows(candidates)
         alike = np.asarray(told & self._known.have_size(radii) & near)
         if self.shadows is not None:

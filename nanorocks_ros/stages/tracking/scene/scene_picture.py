@@ -65,7 +65,13 @@ class SceneColours:
 
     def picture(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The value that shows the beads best, slightly blurred, (rows, columns)."""
-        return _blurred(cv2.transform(color, self._mixture))
+        blue, green, red = cv2.split(color)
+        # Channel by channel takes half as long as `cv2.transform`.
+        weights = self.weights.tolist()
+        mixed = cv2.addWeighted(
+            blue, weights[0], green, weights[1], self._offset, dtype=cv2.CV_32F
+        )
+        return _blurred(cv2.addWeighted(mixed, 1.0, red, weights[2], 0.0, dtype=cv2.CV_8U))
 
     def difference(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Largest difference of a colour of each pixel from the background, slightly blurred."""
@@ -99,10 +105,9 @@ class SceneColours:
             self.background[...] = function(self.background, step)
 
     @property
-    def _mixture(self) -> NDArray[np.float32]:
-        """Weights and offset that keep the mixture of colours within 0 to 255."""
-        offset = -255.0 * np.minimum(self.weights, 0.0).sum()
-        return np.append(self.weights, offset).astype(np.float32)[None, :]
+    def _offset(self) -> float:
+        """What keeps the mixture of colours within 0 to 255."""
+        return float(-255.0 * np.minimum(self.weights, 0.0).sum())
 
 
 def enlarged(color: NDArray[np.uint8], scale: int) -> NDArray[np.uint8]:
