@@ -44,11 +44,11 @@ if TYPE_CHECKING:
     OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
 
 # Share of the outline of a disc to learn from that has edges.
-_GOOD_SUPPORT = 0.7
+_GOOD_SUPPORT = 0.75
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
 # So many frames are searched where fewer discs move.
-_FEW_MOVING, _MORE_FRAMES = 8, 50
+_FEW_MOVING, _MORE_FRAMES = 24, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
 # Distance to a known bead up to which a moving disc looks alike, in spreads.
@@ -171,6 +171,10 @@ class SceneModel:
             # The inside of a clear bead has an outline, too.
             have_size = self._known.have_size(outlines.discs[:, 2] / self.scale)
             outlines, shown = outlines.chosen(have_size), shown[have_size]
+        if self.shadows is not None:
+            # The outline of a shadow may be higher than that of the bead beside it.
+            dark = self._darken_floor(color, outlines.discs)
+            outlines, shown = outlines.chosen(~dark), shown[~dark]
         kept = apart(outlines, self._look.apart)
         outlines, shown = outlines.chosen(kept), shown[kept]
         colours, around = colours_of(color, outlines.discs)
@@ -205,6 +209,13 @@ class SceneModel:
             dark = darken(candidates.colours, candidates.floor)
             alike &= ~self.shadows.among(candidates.outlines.discs, alike, dark)
         return alike
+
+    def _darken_floor(
+        self, color: NDArray[np.uint8], discs: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Which discs (n, 3) are the floor in less light."""
+        now, floor = (colours_of(image, discs)[0] for image in (color, self.colours.background))
+        return darken(now, floor)
 
     def _outlines(
         self,
