@@ -41,12 +41,15 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
+    OwnDiscs = Callable[[NDArray[np.uint8], NDArray[np.float64]], NDArray[np.bool_]]
     OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
 
 # Share of the outline of a disc to learn from that has edges.
 _GOOD_SUPPORT = 0.75
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
+# The usual step is that of known beads where these have less than this part of it.
+_MUCH_WEAKER = 0.7
 # So many frames are searched where fewer discs move.
 _FEW_MOVING, _MORE_FRAMES = 24, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
@@ -97,6 +100,11 @@ class SceneModel:
         if self.colours.knows_background and len(self._moved) < _FEW_MOVING:
             # Of a single bead each frame shows but one.
             self._learn_looks(_some(frames, _MORE_FRAMES))
+        # Hands, rails and skirting boards may have stronger edges than the beads.
+        attended = _some(frames, _LEARNING_FRAMES)
+        if self.sees_motion and self._weaken_steps(attended, self._are_known, _MUCH_WEAKER):
+            few = len(self._moved) < _FEW_MOVING
+            self._learn_looks(_some(frames, _MORE_FRAMES if few else _LEARNING_FRAMES))
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
             large = [enlarged(frame, self.scale) for frame in frames]
@@ -125,19 +133,56 @@ class SceneModel:
         own : callable
             Says of colours (n, 3) inside and around discs which of these are the species.
         """
-        chosen = [enlarged(frame, self.scale) for frame in _some(frames, _STEP_FRAMES)]
+        self._weaken_steps(
+            _some(frames, _STEP_FRAMES), lambda frame, discs: own(*colours_of(frame, discs)), 1.0
+        )
+
+    def _weaken_steps(
+        self, frames: Sequence[NDArray[np.uint8]], own: OwnDiscs, most: float
+    ) -> bool:
+        """Let the usual edges of each view be those of own discs, if these are weaker.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        own : callable
+            Says which discs (n, 3) of an enlarged frame count.
+        most : float
+            Part of the usual step of all discs above which it stays.
+
+        Returns
+        -------
+        bool
+            Whether any changed.
+        """
+        chosen = [enlarged(frame, self.scale) for frame in frames]
+        changed = False
         for k, view in enumerate(self.views):
-            # With weaker edges than those of the discs of all species.
+            # With weaker edges than those of all discs.
             weaker = view.with_step(WEAKER[1] * view.voting.step)
             steps = []
             for frame in chosen:
                 outlines = self._outlines(frame, weaker)
                 good = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
-                steps.append(good.steps[own(*colours_of(frame, good.discs))])
+                steps.append(good.steps[own(frame, good.discs)])
             own_steps = np.concatenate(steps)
             if len(own_steps) >= _LEAST_MOVING:
                 usual = weaker.voting.step * float(np.quantile(own_steps, USUAL))
-                self.views[k] = view.with_step(min(usual, view.voting.step))
+                if usual < most * view.voting.step:
+                    self.views[k] = view.with_step(usual)
+                    changed = True
+        return changed
+
+    def _are_known(
+        self, color: NDArray[np.uint8], discs: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Which discs (n, 3) of an enlarged frame move, and look like known beads."""
+        known = marked_shares(self.colours.moving(color), discs) >= MOVING_SHARE
+        if self._known is not None:
+            radii = discs[:, 2] / self.scale
+            limits = np.full(len(discs), ALIKE)
+            known &= self._known.are_near(colours_of(color, discs)[0], radii, limits)
+        return known
 
     def candidates(
         self, color: NDArray[np.uint8], hints: NDArray[np.float64] | None = None

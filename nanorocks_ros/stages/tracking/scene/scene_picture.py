@@ -65,13 +65,12 @@ class SceneColours:
 
     def picture(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The value that shows the beads best, slightly blurred, (rows, columns)."""
-        blue, green, red = cv2.split(color)
         # Channel by channel takes half as long as `cv2.transform`.
-        weights = self.weights.tolist()
-        mixed = cv2.addWeighted(
-            blue, weights[0], green, weights[1], self._offset, dtype=cv2.CV_32F
-        )
-        return _blurred(cv2.addWeighted(mixed, 1.0, red, weights[2], 0.0, dtype=cv2.CV_8U))
+        blue, green, red = cv2.split(color)
+        of_blue, of_green, of_red = self.weights.tolist()
+        depth = cv2.CV_32F
+        mixed = cv2.addWeighted(blue, of_blue, green, of_green, self._offset, dtype=depth)
+        return _blurred(cv2.addWeighted(mixed, 1.0, red, of_red, 0.0, dtype=cv2.CV_8U))
 
     def difference(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Largest difference of a colour of each pixel from the background, slightly blurred."""

@@ -97,9 +97,8 @@ def _reduced(picture: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
     Means of areas that are not whole pixels take eight times as long.
     """
     while scale <= 0.5:
-        picture = np.asarray(
-            cv2.resize(picture, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-        )
+        half = cv2.resize(picture, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        picture = np.asarray(half)
         scale *= 2.0
     return np.asarray(
         cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR)
