@@ -52,7 +52,7 @@ def finding_diameters(trays_file: str) -> str:
     """How the diameters of a trays file come to be known, for errors."""
     return (
         f'with "look: auto", `nanorocks track FILM --trays-file {shlex.quote(trays_file)}` finds '
-        'it and prints the entry'
+        'it and prints the entry, and so does the node pipeline, from its camera'
     )
 
 

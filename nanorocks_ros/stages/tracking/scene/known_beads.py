@@ -91,7 +91,7 @@ class KnownBeads:
         """Number of the known bead that counts, from the nearest on."""
         # Not the nearest: what was taken for a bead by mistake is known, too.
         least = 2 if self.tree.n >= _MANY else 1
-        return max(least, round(_KNOWN_SHARE * self.tree.n))
+        return max(least, round(_KNOWN_SHARE * int(self.tree.n)))
 
     def have_size(self, radii: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether radii (n,) are those of beads: light and shadow change colours, not sizes."""
