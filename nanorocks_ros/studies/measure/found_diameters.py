@@ -19,7 +19,7 @@ from nanorocks_ros.experiment.unknown_diameters import (
     unknown_diameters,
     with_diameters,
 )
-from nanorocks_ros.experiment.yaml_lines import is_content
+from nanorocks_ros.experiment.yaml_lines import is_content, shown_name
 from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
 from nanorocks_ros.records import TrayImage
@@ -113,20 +113,32 @@ def with_found_diameters(
     unknown = unknown_diameters(settings.trays_file)
     if not unknown:
         return FoundTrays(settings)
+    require_looks(settings)
     nominal = _nominal(settings, told, read_metadata(bag), str(bag))
     return _found_in(settings, nominal, scene_frames(bag, nominal, image_topic=image_topic))
 
 
 def require_looks(settings: PipelineSettings) -> None:
-    """Refuse species whose diameter is left open, and that no film tells: those of the flight.
+    """Refuse a file that cannot be used, and open diameters that no film tells: of the flight.
 
     Raises
     ------
     ConfigurationError
     """
-    trays = load_trays(_with_nominal_beads(settings.trays_file))
+    name = _name(settings.trays_file)
+    content = _with_nominal_beads(settings.trays_file)
+    try:
+        trays = load_trays(content)
+    except ConfigurationError as error:
+        where = error.where.replace(shown_name(content, 'trays file'), name, 1)
+        raise ConfigurationError(where, error.what, error.do) from error
     for key in unknown_diameters(settings.trays_file):
-        _require_look(trays, key, _name(settings.trays_file))
+        if trays[key.tray].species[key.species].appearance is None:
+            raise ConfigurationError(
+                _place(trays, key, name),
+                f'lacks {DIAMETER}',
+                'add it, or "look: auto" to have it found in the film',
+            )
 
 
 def with_diameters_in_view(
@@ -169,7 +181,12 @@ def _found_in(
     name = _name(file)
     film = _Film(load_trays(nominal.trays_file), nominal.preprocess.pixels_per_metre, frames)
     for key in unknown:
-        _check_can_be_found(film, key, name)
+        if key.tray not in frames:
+            raise ConfigurationError(
+                _place(film.trays, key, name),
+                f'lacks {DIAMETER}, and the film does not show this tray',
+                'add it',
+            )
     sizes = _sizes(film, unknown, name)
     diameters, notices = {}, []
     for key, size in sizes.items():
@@ -277,23 +294,3 @@ def _inside(tray: Tray, places: NDArray[np.float64]) -> NDArray[np.bool_]:
     for mask in tray.masks:
         inside &= ~within(mask)
     return inside
-
-
-def _check_can_be_found(film: _Film, key: UnknownDiameter, name: str) -> None:
-    """Refuse beads that the film does not show, and those of the flight."""
-    _require_look(film.trays, key, name)
-    if key.tray not in film.frames:
-        raise ConfigurationError(
-            _place(film.trays, key, name),
-            f'lacks {DIAMETER}, and the film does not show this tray',
-            'add it',
-        )
-
-
-def _require_look(trays: Mapping[int, Tray], key: UnknownDiameter, name: str) -> None:
-    if trays[key.tray].species[key.species].appearance is None:
-        raise ConfigurationError(
-            _place(trays, key, name),
-            f'lacks {DIAMETER}',
-            'add it, or "look: auto" to have it found in the film',
-        )
