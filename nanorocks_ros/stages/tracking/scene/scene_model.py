@@ -44,8 +44,9 @@ if TYPE_CHECKING:
     OwnDiscs = Callable[[NDArray[np.uint8], NDArray[np.float64]], NDArray[np.bool_]]
     OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
 
-# Share of the outline of a disc to learn from that has edges.
-_GOOD_SUPPORT = 0.75
+# Share of the outline of a disc to learn from that has edges, and of one that tells what beads
+# look like: fingers have less.
+_GOOD_SUPPORT, _WHOLE_SUPPORT = 0.7, 0.75
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
 # The usual step is that of known beads where these have less than this part of it.
@@ -313,6 +314,8 @@ class SceneModel:
         self.sees_motion = bool(moving.sum() >= enough)
         self._moved = every.outlines.discs[moving]
         known = moving if self.sees_motion else good
+        whole = known & (every.outlines.support >= _WHOLE_SUPPORT)
+        known = whole if whole.sum() >= _LEAST_MOVING else known
         self._known = KnownBeads.of(every.colours[known], every.outlines.discs[known, 2])
         self._at_rest = AtRest()
         moved = self.alike(every) & moving
