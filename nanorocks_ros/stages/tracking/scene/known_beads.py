@@ -25,8 +25,8 @@ ALIKE = 3.0
 _KNOWN_SHARE = 0.03
 _LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
 _MOST_SAMPLES = 400
-# Of so many known beads two are alike.
-_MANY = 6
+# Of so many known beads two are alike, and of so many three.
+_MANY = 6, 24
 # The outline of a disc at rest has at least this part of the quality of those that move, of which
 # so many are worse. Less moves of it than this part of what usually does: a bead may pass by.
 _AT_REST_SHARE, _USUALLY_WORST, _LESS_MOVING = 0.6, 0.05, 0.5
@@ -90,7 +90,7 @@ class KnownBeads:
     def _nearest(self) -> int:
         """Number of the known bead that counts, from the nearest on."""
         # Not the nearest: what was taken for a bead by mistake is known, too.
-        least = 2 if self.tree.n >= _MANY else 1
+        least = 1 + sum(self.tree.n >= many for many in _MANY)
         return max(least, round(_KNOWN_SHARE * int(self.tree.n)))
 
     def have_size(self, radii: NDArray[np.float64]) -> NDArray[np.bool_]:

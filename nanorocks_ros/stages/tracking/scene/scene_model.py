@@ -49,8 +49,9 @@ if TYPE_CHECKING:
 _GOOD_SUPPORT, _WHOLE_SUPPORT = 0.7, 0.75
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
-# The usual step is that of known beads where these have less than this part of it.
-_MUCH_WEAKER = 0.7
+# Edges down to this part of the usual step are searched for those of known beads, which are the
+# usual ones where they have less than this part of it.
+_MUCH_WEAKER = WEAKER[-1], 0.7
 # So many frames are searched where fewer discs move.
 _FEW_MOVING, _MORE_FRAMES = 24, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
@@ -97,15 +98,16 @@ class SceneModel:
         self._known: KnownBeads | None = None
         self._roamed: RoamedRegion | None = None
         self._at_rest = AtRest()
-        self._learn(_some(frames, _LEARNING_FRAMES))
+        lesson = _some(frames, _LEARNING_FRAMES)
+        attended = _some(frames, _STEP_FRAMES)
+        self._learn(lesson)
         if self.colours.knows_background and len(self._moved) < _FEW_MOVING:
             # Of a single bead each frame shows but one.
-            self._learn_looks(_some(frames, _MORE_FRAMES))
+            lesson = attended = _some(frames, _MORE_FRAMES)
+            self._learn_looks(lesson)
         # Hands, rails and skirting boards may have stronger edges than the beads.
-        attended = _some(frames, _LEARNING_FRAMES)
         if self.sees_motion and self._weaken_steps(attended, self._are_known, _MUCH_WEAKER):
-            few = len(self._moved) < _FEW_MOVING
-            self._learn_looks(_some(frames, _MORE_FRAMES if few else _LEARNING_FRAMES))
+            self._learn_looks(lesson)
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
             large = [enlarged(frame, self.scale) for frame in frames]
@@ -135,11 +137,13 @@ class SceneModel:
             Says of colours (n, 3) inside and around discs which of these are the species.
         """
         self._weaken_steps(
-            _some(frames, _STEP_FRAMES), lambda frame, discs: own(*colours_of(frame, discs)), 1.0
+            _some(frames, _STEP_FRAMES),
+            lambda frame, discs: own(*colours_of(frame, discs)),
+            (WEAKER[1], 1.0),
         )
 
     def _weaken_steps(
-        self, frames: Sequence[NDArray[np.uint8]], own: OwnDiscs, most: float
+        self, frames: Sequence[NDArray[np.uint8]], own: OwnDiscs, parts: tuple[float, float]
     ) -> bool:
         """Let the usual edges of each view be those of own discs, if these are weaker.
 
@@ -148,19 +152,20 @@ class SceneModel:
         frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
         own : callable
             Says which discs (n, 3) of an enlarged frame count.
-        most : float
-            Part of the usual step of all discs above which it stays.
+        parts : tuple of 2 floats
+            Of the usual step of all discs: down to which edges are searched, and above which it
+            stays.
 
         Returns
         -------
         bool
             Whether any changed.
         """
+        searched, most = parts
         chosen = [enlarged(frame, self.scale) for frame in frames]
         changed = False
         for k, view in enumerate(self.views):
-            # With weaker edges than those of all discs.
-            weaker = view.with_step(WEAKER[1] * view.voting.step)
+            weaker = view.with_step(searched * view.voting.step)
             steps = []
             for frame in chosen:
                 outlines = self._outlines(frame, weaker)

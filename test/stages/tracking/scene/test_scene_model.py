@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -57,3 +58,31 @@ def test_an_empty_film_has_no_disc():
 def test_more_beads_than_fit_are_not_drawn(more):
     with pytest.raises(SystemExit, match='fit in 400 x 300 px; draw fewer'):
         draw(replace(DrawnScene(frames=1), **more))
+
+
+def faint_beads(count=6, frames=24, *, bolts=0):
+    """Frames of bright beads on a gray floor, beside bolts that are far brighter, and radii."""
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[:240, :360]
+    pictures = []
+    for k in range(frames):
+        picture = np.full((240, 360), 120.0)
+        for i in range(count):
+            place = 40.0 + 50.0 * i + 1.5 * k, 60.0 + 20.0 * (i % 3) + 2.0 * k
+            cover = np.clip(10.5 - np.hypot(x - place[0], y - place[1]), 0.0, 1.0)
+            picture += 22.0 * cover
+        for i in range(bolts):
+            cover = np.clip(10.5 - np.hypot(x - 25.0 - 34.0 * i, y - 215.0), 0.0, 1.0)
+            picture += 130.0 * cover
+        picture = cv2.GaussianBlur(picture, (0, 0), 0.8) + rng.normal(0.0, 1.0, picture.shape)
+        gray = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+        pictures.append(np.repeat(gray[:, :, None], 3, axis=2))
+    return pictures
+
+
+def test_the_usual_edge_is_that_of_beads_beside_bolts_with_far_higher_ones():
+    alone = scene_model(faint_beads(), BeadLook(radii=(8.0, 12.0)))
+    beside = scene_model(faint_beads(bolts=10), BeadLook(radii=(8.0, 12.0)))
+    bright = [view for view in beside.views if not view.moves and view.voting.sign == 1]
+    usual = next(view for view in alone.views if not view.moves and view.voting.sign == 1)
+    assert bright[0].voting.step == pytest.approx(usual.voting.step, rel=0.3)
