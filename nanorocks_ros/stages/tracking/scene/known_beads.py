@@ -90,8 +90,9 @@ class KnownBeads:
     def _nearest(self) -> int:
         """Number of the known bead that counts, from the nearest on."""
         # Not the nearest: what was taken for a bead by mistake is known, too.
-        least = 1 + sum(self.tree.n >= many for many in _MANY)
-        return max(least, round(_KNOWN_SHARE * int(self.tree.n)))
+        count = int(self.tree.n)
+        least = 1 + sum(count >= many for many in _MANY)
+        return max(least, round(_KNOWN_SHARE * count))
 
     def have_size(self, radii: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether radii (n,) are those of beads: light and shadow change colours, not sizes."""
