@@ -67,9 +67,7 @@ def search_outlines(
     centres = _away(centres_of_all_sizes(picture, voting, _LEAST_VOTES), sure, voting)
     starts, votes = centres[:, :3], centres[:, 3]
     at_starts = fit_outlines(picture, starts, voting)
-    surely = are_sure(at_starts, voting.step)
-    sure = np.concatenate([sure, at_starts.discs[surely]])
-    beside = _away(_beside(starts[(votes > _SOFT_VOTES) & ~surely]), sure, voting)
+    beside = _beside(starts[(votes > _SOFT_VOTES) & ~are_sure(at_starts, voting.step)])
     at_beside = fit_outlines(picture, beside, voting)
     # A smeared bead has wide edges, too, but no whole outline.
     whole = at_beside.support >= _WHOLE_SUPPORT
