@@ -115,7 +115,7 @@ def test_shadows_that_are_known_do_not_compete_with_their_beads():
     frames, places = beads_over_shadows()
     model = scene_model(frames, BeadLook(radii=(7.5, 12.5), apart=1.25))
     assert model.shadows is not None
-    for frame, now in zip(frames[::4], places[::4], strict=True):
+    for frame, now in zip(frames[::3], places[::3], strict=True):
         candidates = model.candidates(frame)
         alike = candidates.outlines.discs[model.alike(candidates)]
         away = np.hypot(*(now[:, None, k] - alike[None, :, k] for k in range(2)))
