@@ -50,9 +50,11 @@ def unknown_diameters(trays_file: str | Path) -> tuple[UnknownDiameter, ...]:
 
 def finding_diameters(trays_file: str) -> str:
     """How the diameters of a trays file come to be known, for errors."""
+    file = shlex.quote(trays_file)
     return (
-        f'with "look: auto", `nanorocks track FILM --trays-file {shlex.quote(trays_file)}` finds '
-        'it and prints the entry'
+        f'with "look: auto", `nanorocks track FILM --trays-file {file}` finds it and prints the '
+        'entry, and so does, from a camera, `ros2 run nanorocks_ros pipeline --ros-args '
+        f'-p source:=topic -p trays_file:={file}`'
     )
 
 

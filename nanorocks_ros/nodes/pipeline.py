@@ -14,6 +14,7 @@ from nanorocks_ros.nodes.base.told_settings import default_settings
 from nanorocks_ros.nodes.frames.frame_source import FrameSource, SourceChoice
 from nanorocks_ros.nodes.frames.frame_stages import FrameStages
 from nanorocks_ros.nodes.sources.bag_source import refuse_unused_parameters, settings_of_bag
+from nanorocks_ros.nodes.sources.open_diameters import find_open_diameters
 from nanorocks_ros.nodes.workers.graph_recorder import GraphRecorder, provenance
 from nanorocks_ros.nodes.workers.live_page_process import LivePageProcess
 from nanorocks_ros.wire import topics
@@ -27,12 +28,13 @@ class PipelineNode(NanorocksNode):
         declare = self.parameters.declare
         source = declare(st.SourceSettings()).source
         bag = declare(st.BagSettings())
+        camera = declare(st.CameraSettings())
+        find_open_diameters(self, source, bag, camera)
         # What is told to the node replaces what the bag says.
         defaults = settings_of_bag(self, bag) if source == 'bag' else default_settings(self)
         settings = declare(defaults, read_only=False)
         simulation = declare(st.SimulationSettings(), prefix='simulation.')
         pacing = declare(st.PacingSettings())
-        camera = declare(st.CameraSettings())
         self._record_settings = declare(st.RecordSettings())
         page = declare(st.DashboardSettings(), prefix='dashboard_')
         with_page = declare(st.LivePageSettings()).dashboard

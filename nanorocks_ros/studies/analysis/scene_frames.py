@@ -12,12 +12,14 @@ from nanorocks_ros.stages.tracking.tracker import Tracker
 from nanorocks_ros.studies.analysis.bag_images import BagImages
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
     import numpy as np
     from numpy.typing import NDArray
 
+    from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import TrayImage
     from nanorocks_ros.settings import PipelineSettings
 
 _FRAMES = 25
@@ -51,16 +53,30 @@ def scene_frames(
     FrameError
         When no frame can be used.
     """
-    learnt = {number for number, tray in trays_of(settings).items() if tray.is_learnt}
-    if not learnt:
+    if not any(tray.is_learnt for tray in trays_of(settings).values()):
         return {}
     images = BagImages(path, settings, image_topic)
-    trackers = {number: Tracker(images.settings, images.trays[number]) for number in learnt}
-    frames: dict[int, list[NDArray[np.uint8]]] = {number: [] for number in learnt}
     every = max(1, images.bag.count // _FRAMES)
-    for shot in images.shots(progress, every=every):
-        for image in shot.images:
-            color = trackers[image.tray].color_of(image) if image.tray in learnt else None
-            if color is not None:
-                frames[image.tray].append(color)
-    return {number: rows for number, rows in frames.items() if rows}
+    shown = (image for shot in images.shots(progress, every=every) for image in shot.images)
+    return learnt_colours(shown, images.settings, images.trays)
+
+
+def learnt_colours(
+    images: Iterable[TrayImage], settings: PipelineSettings, trays: Mapping[int, Tray]
+) -> dict[int, list[NDArray[np.uint8]]]:
+    """Colours of the images of trays whose beads are learnt, by tray.
+
+    Parameters
+    ----------
+    images : iterable of TrayImage
+    settings : PipelineSettings
+    trays : mapping of int to Tray
+    """
+    learnt = {number: tray for number, tray in trays.items() if tray.is_learnt}
+    trackers = {number: Tracker(settings, tray) for number, tray in learnt.items()}
+    frames: dict[int, list[NDArray[np.uint8]]] = {}
+    for image in images:
+        color = trackers[image.tray].color_of(image) if image.tray in learnt else None
+        if color is not None:
+            frames.setdefault(image.tray, []).append(color)
+    return frames

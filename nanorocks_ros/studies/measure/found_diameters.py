@@ -19,12 +19,15 @@ from nanorocks_ros.experiment.unknown_diameters import (
     unknown_diameters,
     with_diameters,
 )
-from nanorocks_ros.experiment.yaml_lines import is_content
+from nanorocks_ros.experiment.yaml_lines import is_content, shown_name
+from nanorocks_ros.pipeline.composition import trays_of
 from nanorocks_ros.recordings.bag.bag_folder import read_metadata
+from nanorocks_ros.records import TrayImage
+from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_detector import SceneDetector
 from nanorocks_ros.stages.tracking.scene.scene_model import SceneModel
-from nanorocks_ros.studies.analysis.scene_frames import scene_frames
+from nanorocks_ros.studies.analysis.scene_frames import learnt_colours, scene_frames
 from nanorocks_ros.studies.measure.species_sizes import (
     FoundDiameter,
     SpeciesLook,
@@ -40,6 +43,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.tray_cells import Polygon
     from nanorocks_ros.experiment.trays import Tray
+    from nanorocks_ros.records import Frame
     from nanorocks_ros.settings import PipelineSettings
 
 # Beads that stand for those of unknown size until they are seen, and the most that are.
@@ -106,25 +110,98 @@ def with_found_diameters(
     RecordingError
         When the bag cannot be read.
     """
-    file = settings.trays_file
-    unknown = unknown_diameters(file)
+    unknown = unknown_diameters(settings.trays_file)
     if not unknown:
         return FoundTrays(settings)
-    name = 'trays file' if is_content(file) else file
-    film = _with_nominal_beads(settings, unknown, told, bag, image_topic)
+    require_looks(settings)
+    nominal = _nominal(settings, told, read_metadata(bag), str(bag))
+    return _found_in(settings, nominal, scene_frames(bag, nominal, image_topic=image_topic))
+
+
+def require_looks(settings: PipelineSettings) -> None:
+    """Refuse a file that cannot be used, and open diameters that no film tells: of the flight.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    name = _name(settings.trays_file)
+    content = _with_nominal_beads(settings.trays_file)
+    try:
+        trays = load_trays(content)
+    except ConfigurationError as error:
+        where = error.where.replace(shown_name(content, 'trays file'), name, 1)
+        raise ConfigurationError(where, error.what, error.do) from error
+    for key in unknown_diameters(settings.trays_file):
+        if trays[key.tray].species[key.species].appearance is None:
+            raise ConfigurationError(
+                _place(trays, key, name),
+                f'lacks {DIAMETER}',
+                'add it, or "look: auto" to have it found in the film',
+            )
+
+
+def with_diameters_in_view(
+    settings: PipelineSettings, told: Collection[str], camera: str, frames: Sequence[Frame]
+) -> FoundTrays:
+    """Find the diameters that the trays file of the settings leaves open, in frames of a camera.
+
+    Parameters
+    ----------
+    settings : PipelineSettings
+    told : collection of str
+        Names of the settings that the user told, as of `recorded_settings`.
+    camera : str
+        Its name in errors.
+    frames : sequence of Frame
+        Spread over some seconds.
+
+    Raises
+    ------
+    ConfigurationError
+        When a diameter cannot be found, or the settings not be used.
+    FrameError
+        When a frame cannot be used.
+    """
+    nominal = _nominal(settings, told, {}, camera)
+    trays = trays_of(nominal)
+    stage = Preprocessor(nominal, trays, camera)
+    records = [record for frame in frames for record in stage.push(frame)]
+    images = [record for record in (*records, *stage.flush()) if isinstance(record, TrayImage)]
+    return _found_in(settings, nominal, learnt_colours(images, nominal, trays))
+
+
+def _found_in(
+    settings: PipelineSettings,
+    nominal: PipelineSettings,
+    frames: Mapping[int, Sequence[NDArray[np.uint8]]],
+) -> FoundTrays:
+    """The settings with the diameters that frames by tray show."""
+    file, unknown = settings.trays_file, unknown_diameters(settings.trays_file)
+    name = _name(file)
+    film = _Film(load_trays(nominal.trays_file), nominal.preprocess.pixels_per_metre, frames)
     for key in unknown:
-        _check_can_be_found(film, key, name)
+        if key.tray not in frames:
+            raise ConfigurationError(
+                _place(film.trays, key, name),
+                f'lacks {DIAMETER}, and the film does not show this tray',
+                'add it',
+            )
     sizes = _sizes(film, unknown, name)
     diameters, notices = {}, []
     for key, size in sizes.items():
         diameters[key] = size.diameter / film.scale / MILLIMETRE
         notices.append(
-            f'{_place(film, key, name, "the diameter of ")} is found in the film: '
+            f'{_place(film.trays, key, name, "the diameter of ")} is found in the film: '
             f'{diameters[key]:.4g} mm at {film.scale:.6g} px/m, from {size}; '
             f'{DIAMETER}: {diameters[key]:.4g} keeps it'
         )
     text = with_diameters(file, diameters)
     return FoundTrays(replace(settings, trays_file=text), tuple(notices))
+
+
+def _name(trays_file: str) -> str:
+    return 'trays file' if is_content(trays_file) else trays_file
 
 
 class _Film(NamedTuple):
@@ -135,25 +212,25 @@ class _Film(NamedTuple):
     frames: Mapping[int, Sequence[NDArray[np.uint8]]]
 
 
-def _with_nominal_beads(
+def _with_nominal_beads(trays_file: str) -> str:
+    """Content of the trays file with some diameter where there is none."""
+    return with_diameters(trays_file, dict.fromkeys(unknown_diameters(trays_file), _NOMINAL_MM))
+
+
+def _nominal(
     settings: PipelineSettings,
-    unknown: Sequence[UnknownDiameter],
     told: Collection[str],
-    bag: Path,
-    image_topic: str,
-) -> _Film:
-    text = with_diameters(settings.trays_file, dict.fromkeys(unknown, _NOMINAL_MM))
-    nominal = replace(settings, trays_file=text)
-    recorded = calibrated(recorded_settings(nominal, told, read_metadata(bag), str(bag)).settings)
-    frames = scene_frames(bag, recorded, image_topic=image_topic)
-    return _Film(load_trays(text), recorded.preprocess.pixels_per_metre, frames)
+    metadata: Mapping[str, str],
+    recording: str,
+) -> PipelineSettings:
+    """The settings with beads of any size, completed by what a recording says."""
+    some = replace(settings, trays_file=_with_nominal_beads(settings.trays_file))
+    return calibrated(recorded_settings(some, told, metadata, recording).settings)
 
 
-def _place(film: _Film, key: UnknownDiameter, name: str, before: str = '') -> str:
+def _place(trays: Mapping[int, Tray], key: UnknownDiameter, name: str, before: str = '') -> str:
     """A species, for errors and notices."""
-    return (
-        f'{name}: {before}{film.trays[key.tray].species[key.species].material} in tray {key.tray}'
-    )
+    return f'{name}: {before}{trays[key.tray].species[key.species].material} in tray {key.tray}'
 
 
 def _sizes(
@@ -170,7 +247,7 @@ def _sizes(
             found = _of_several_species(tray, film.scale, frames, [key.species for key in keys])
         if isinstance(found, str):
             problem = f'its diameter cannot be found: {found}'
-            raise ConfigurationError(_place(film, keys[0], name), problem, _REMEDY)
+            raise ConfigurationError(_place(film.trays, keys[0], name), problem, _REMEDY)
         sizes |= {key: found[key.species] for key in keys}
     return sizes
 
@@ -217,19 +294,3 @@ def _inside(tray: Tray, places: NDArray[np.float64]) -> NDArray[np.bool_]:
     for mask in tray.masks:
         inside &= ~within(mask)
     return inside
-
-
-def _check_can_be_found(film: _Film, key: UnknownDiameter, name: str) -> None:
-    """Refuse beads that the film does not show, and those of the flight."""
-    if film.trays[key.tray].species[key.species].appearance is None:
-        raise ConfigurationError(
-            _place(film, key, name),
-            f'lacks {DIAMETER}',
-            'add it, or "look: auto" to have it found in the film',
-        )
-    if key.tray not in film.frames:
-        raise ConfigurationError(
-            _place(film, key, name),
-            f'lacks {DIAMETER}, and the film does not show this tray',
-            'add it',
-        )

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import have_near
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -23,8 +25,8 @@ ALIKE = 3.0
 _KNOWN_SHARE = 0.03
 _LEAST_COLOUR_SPREAD, _LEAST_RADIUS_SPREAD = 6.0, 0.05
 _MOST_SAMPLES = 400
-# Of so many known beads two are alike.
-_MANY = 6
+# Of so many known beads two are alike, and of so many three.
+_MANY = 6, 24
 # The outline of a disc at rest has at least this part of the quality of those that move, of which
 # so many are worse. Less moves of it than this part of what usually does: a bead may pass by.
 _AT_REST_SHARE, _USUALLY_WORST, _LESS_MOVING = 0.6, 0.05, 0.5
@@ -68,11 +70,29 @@ class KnownBeads:
         self, colours: NDArray[np.float64], radii: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Distance of discs with colours (n, 3) and radii (n,) to known beads, in spreads."""
-        # Not the nearest: what was taken for a bead by mistake is known, too.
-        least = 2 if self.tree.n >= _MANY else 1
-        nearest = max(least, round(_KNOWN_SHARE * self.tree.n))
         features = np.column_stack([colours, np.log(radii)]) / self.spreads
-        return np.asarray(self.tree.query(features, k=[nearest])[0][:, 0])
+        return np.asarray(self.tree.query(features, k=[self._nearest])[0][:, 0])
+
+    def are_near(
+        self,
+        colours: NDArray[np.float64],
+        radii: NDArray[np.float64],
+        limits: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Which discs are nearer than limits (n,) to known beads, in spreads, by `distances`."""
+        features = np.column_stack([colours, np.log(radii)]) / self.spreads
+        near = np.empty(len(features), dtype=bool)
+        # Most discs are beads, near to many: a search for the nearest ones would take longer.
+        have_near(features, self.tree.data, limits, self._nearest, near)
+        return near
+
+    @property
+    def _nearest(self) -> int:
+        """Number of the known bead that counts, from the nearest on."""
+        # Not the nearest: what was taken for a bead by mistake is known, too.
+        count = int(self.tree.n)
+        least = 1 + sum(count >= many for many in _MANY)
+        return max(least, round(_KNOWN_SHARE * count))
 
     def have_size(self, radii: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether radii (n,) are those of beads: light and shadow change colours, not sizes."""

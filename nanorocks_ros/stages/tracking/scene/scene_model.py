@@ -41,14 +41,19 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
+    OwnDiscs = Callable[[NDArray[np.uint8], NDArray[np.float64]], NDArray[np.bool_]]
     OwnColours = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
 
-# Share of the outline of a disc to learn from that has edges.
-_GOOD_SUPPORT = 0.7
+# Share of the outline of a disc to learn from that has edges, and of one that tells what beads
+# look like: fingers have less.
+_GOOD_SUPPORT, _WHOLE_SUPPORT = 0.7, 0.75
 # Moving discs that tell what beads look like, and their share of all discs.
 _LEAST_MOVING, _LEAST_MOVING_SHARE = 4, 0.04
+# Edges down to this part of the usual step are searched for those of known beads, which are the
+# usual ones where they have less than this part of it.
+_MUCH_WEAKER = WEAKER[-1], 0.7
 # So many frames are searched where fewer discs move.
-_FEW_MOVING, _MORE_FRAMES = 8, 50
+_FEW_MOVING, _MORE_FRAMES = 24, 50
 # Trust in outlines of the difference from the background, over those of the picture itself.
 _DIFFERENCE_TRUST = 0.7
 # Distance to a known bead up to which a moving disc looks alike, in spreads.
@@ -93,10 +98,16 @@ class SceneModel:
         self._known: KnownBeads | None = None
         self._roamed: RoamedRegion | None = None
         self._at_rest = AtRest()
-        self._learn(_some(frames, _LEARNING_FRAMES))
+        lesson = _some(frames, _LEARNING_FRAMES)
+        attended = _some(frames, _STEP_FRAMES)
+        self._learn(lesson)
         if self.colours.knows_background and len(self._moved) < _FEW_MOVING:
             # Of a single bead each frame shows but one.
-            self._learn_looks(_some(frames, _MORE_FRAMES))
+            lesson = attended = _some(frames, _MORE_FRAMES)
+            self._learn_looks(lesson)
+        # Hands, rails and skirting boards may have stronger edges than the beads.
+        if self.sees_motion and self._weaken_steps(attended, self._are_known, _MUCH_WEAKER):
+            self._learn_looks(lesson)
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
             large = [enlarged(frame, self.scale) for frame in frames]
@@ -125,19 +136,59 @@ class SceneModel:
         own : callable
             Says of colours (n, 3) inside and around discs which of these are the species.
         """
-        chosen = [enlarged(frame, self.scale) for frame in _some(frames, _STEP_FRAMES)]
+        self._weaken_steps(
+            _some(frames, _STEP_FRAMES),
+            lambda frame, discs: own(*colours_of(frame, discs)),
+            (WEAKER[1], 1.0),
+        )
+
+    def _weaken_steps(
+        self, frames: Sequence[NDArray[np.uint8]], own: OwnDiscs, parts: tuple[float, float]
+    ) -> bool:
+        """Let the usual edges of each view be those of own discs, if these are weaker.
+
+        Parameters
+        ----------
+        frames : sequence of ndarrays of uint8, (rows, columns, 3), bgr
+        own : callable
+            Says which discs (n, 3) of an enlarged frame count.
+        parts : tuple of 2 floats
+            Of the usual step of all discs: down to which edges are searched, and above which it
+            stays.
+
+        Returns
+        -------
+        bool
+            Whether any changed.
+        """
+        searched, most = parts
+        chosen = [enlarged(frame, self.scale) for frame in frames]
+        changed = False
         for k, view in enumerate(self.views):
-            # With weaker edges than those of the discs of all species.
-            weaker = view.with_step(WEAKER[1] * view.voting.step)
+            weaker = view.with_step(searched * view.voting.step)
             steps = []
             for frame in chosen:
                 outlines = self._outlines(frame, weaker)
                 good = outlines.chosen(outlines.support >= _GOOD_SUPPORT)
-                steps.append(good.steps[own(*colours_of(frame, good.discs))])
+                steps.append(good.steps[own(frame, good.discs)])
             own_steps = np.concatenate(steps)
             if len(own_steps) >= _LEAST_MOVING:
                 usual = weaker.voting.step * float(np.quantile(own_steps, USUAL))
-                self.views[k] = view.with_step(min(usual, view.voting.step))
+                if usual < most * view.voting.step:
+                    self.views[k] = view.with_step(usual)
+                    changed = True
+        return changed
+
+    def _are_known(
+        self, color: NDArray[np.uint8], discs: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Which discs (n, 3) of an enlarged frame move, and look like known beads."""
+        known = marked_shares(self.colours.moving(color), discs) >= MOVING_SHARE
+        if self._known is not None:
+            radii = discs[:, 2] / self.scale
+            limits = np.full(len(discs), ALIKE)
+            known &= self._known.are_near(colours_of(color, discs)[0], radii, limits)
+        return known
 
     def candidates(
         self, color: NDArray[np.uint8], hints: NDArray[np.float64] | None = None
@@ -171,6 +222,10 @@ class SceneModel:
             # The inside of a clear bead has an outline, too.
             have_size = self._known.have_size(outlines.discs[:, 2] / self.scale)
             outlines, shown = outlines.chosen(have_size), shown[have_size]
+        if self.shadows is not None:
+            # The outline of a shadow may be higher than that of the bead beside it.
+            dark = self._darken_floor(color, outlines.discs)
+            outlines, shown = outlines.chosen(~dark), shown[~dark]
         kept = apart(outlines, self._look.apart)
         outlines, shown = outlines.chosen(kept), shown[kept]
         colours, around = colours_of(color, outlines.discs)
@@ -197,15 +252,21 @@ class SceneModel:
         if self._known is None:
             return np.asarray(told)
         radii = candidates.outlines.discs[:, 2]
-        distances = self._known.distances(candidates.colours, radii)
-        rest = candidates.moving < MOVING_SHARE
-        near = distances < np.where(rest, ALIKE, _ALIKE_MOVING)
+        limits = np.where(candidates.moving < MOVING_SHARE, ALIKE, _ALIKE_MOVING)
+        near = self._known.are_near(candidates.colours, radii, limits)
         near &= self._at_rest.allows(candidates)
         alike = np.asarray(told & self._known.have_size(radii) & near)
         if self.shadows is not None:
             dark = darken(candidates.colours, candidates.floor)
             alike &= ~self.shadows.among(candidates.outlines.discs, alike, dark)
         return alike
+
+    def _darken_floor(
+        self, color: NDArray[np.uint8], discs: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Which discs (n, 3) are the floor in less light."""
+        now, floor = (colours_of(image, discs)[0] for image in (color, self.colours.background))
+        return darken(now, floor)
 
     def _outlines(
         self,
@@ -258,6 +319,8 @@ class SceneModel:
         self.sees_motion = bool(moving.sum() >= enough)
         self._moved = every.outlines.discs[moving]
         known = moving if self.sees_motion else good
+        whole = known & (every.outlines.support >= _WHOLE_SUPPORT)
+        known = whole if whole.sum() >= _LEAST_MOVING else known
         self._known = KnownBeads.of(every.colours[known], every.outlines.discs[known, 2])
         self._at_rest = AtRest()
         moved = self.alike(every) & moving

@@ -65,7 +65,12 @@ class SceneColours:
 
     def picture(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The value that shows the beads best, slightly blurred, (rows, columns)."""
-        return _blurred(cv2.transform(color, self._mixture))
+        # Channel by channel takes half as long as `cv2.transform`.
+        blue, green, red = cv2.split(color)
+        of_blue, of_green, of_red = self.weights.tolist()
+        depth = cv2.CV_32F
+        mixed = cv2.addWeighted(blue, of_blue, green, of_green, self._offset, dtype=depth)
+        return _blurred(cv2.addWeighted(mixed, 1.0, red, of_red, 0.0, dtype=cv2.CV_8U))
 
     def difference(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Largest difference of a colour of each pixel from the background, slightly blurred."""
@@ -99,10 +104,9 @@ class SceneColours:
             self.background[...] = function(self.background, step)
 
     @property
-    def _mixture(self) -> NDArray[np.float32]:
-        """Weights and offset that keep the mixture of colours within 0 to 255."""
-        offset = -255.0 * np.minimum(self.weights, 0.0).sum()
-        return np.append(self.weights, offset).astype(np.float32)[None, :]
+    def _offset(self) -> float:
+        """What keeps the mixture of colours within 0 to 255."""
+        return float(-255.0 * np.minimum(self.weights, 0.0).sum())
 
 
 def enlarged(color: NDArray[np.uint8], scale: int) -> NDArray[np.uint8]:

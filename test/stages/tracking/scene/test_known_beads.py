@@ -27,6 +27,18 @@ def test_other_colours_are_farther_away(known):
     assert own < ALIKE < blue
 
 
+@pytest.mark.parametrize('count', [1, 5, 8, 40, 700])
+def test_those_are_near_whose_distance_is_below_the_limit(count):
+    rng = np.random.default_rng(count)
+    beads = KnownBeads.of(rng.uniform(0.0, 255.0, (count, 3)), rng.uniform(10.0, 12.0, count))
+    colours, radii = rng.uniform(0.0, 255.0, (300, 3)), rng.uniform(9.0, 13.0, 300)
+    distances = beads.distances(colours, radii)
+    # None equal to a distance, whose rounding would decide.
+    limits = 1.0000001 * rng.permutation(distances)
+    assert np.array_equal(beads.are_near(colours, radii, limits), distances < limits)
+    assert beads.are_near(colours, radii, limits).any()
+
+
 def test_a_finger_tip_of_the_colour_of_a_bead_has_another_size(known):
     assert known.have_size(np.array([14.0, 15.0, 16.5])).all()
     assert not known.have_size(np.array([11.9, 20.0])).any()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from benchmarks.drawn_scenes import SCENES, DrawnScene, draw
 from benchmarks.recognition import drawn_score
 from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
+from nanorocks_ros.stages.tracking.scene.floor_behind import darken
 from nanorocks_ros.stages.tracking.scene.scene_model import scene_model
 
 
@@ -57,3 +59,66 @@ def test_an_empty_film_has_no_disc():
 def test_more_beads_than_fit_are_not_drawn(more):
     with pytest.raises(SystemExit, match='fit in 400 x 300 px; draw fewer'):
         draw(replace(DrawnScene(frames=1), **more))
+
+
+def faint_beads(count=6, frames=24, *, bolts=0):
+    """Frames of bright beads on a gray floor, beside bolts that are far brighter, and radii."""
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[:240, :360]
+    pictures = []
+    for k in range(frames):
+        picture = np.full((240, 360), 120.0)
+        for i in range(count):
+            place = 40.0 + 50.0 * i + 1.5 * k, 60.0 + 20.0 * (i % 3) + 2.0 * k
+            cover = np.clip(10.5 - np.hypot(x - place[0], y - place[1]), 0.0, 1.0)
+            picture += 22.0 * cover
+        for i in range(bolts):
+            cover = np.clip(10.5 - np.hypot(x - 25.0 - 34.0 * i, y - 215.0), 0.0, 1.0)
+            picture += 130.0 * cover
+        picture = cv2.GaussianBlur(picture, (0, 0), 0.8) + rng.normal(0.0, 1.0, picture.shape)
+        gray = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+        pictures.append(np.repeat(gray[:, :, None], 3, axis=2))
+    return pictures
+
+
+def test_the_usual_edge_is_that_of_beads_beside_bolts_with_far_higher_ones():
+    alone = scene_model(faint_beads(), BeadLook(radii=(8.0, 12.0)))
+    beside = scene_model(faint_beads(bolts=10), BeadLook(radii=(8.0, 12.0)))
+    bright = [view for view in beside.views if not view.moves and view.voting.sign == 1]
+    usual = next(view for view in alone.views if not view.moves and view.voting.sign == 1)
+    assert bright[0].voting.step == pytest.approx(usual.voting.step, rel=0.3)
+
+
+def beads_over_shadows(frames=24):
+    """Frames of bright beads, each over a shadow that is larger and darker in some, and places."""
+    rng = np.random.default_rng(7)
+    y, x = np.mgrid[:240, :360]
+    pictures, places = [], []
+    for k in range(frames):
+        picture = np.full((240, 360), 140.0)
+        now = [(40.0 + 50.0 * i + 1.5 * k, 50.0 + 22.0 * (i % 3) + 2.0 * k) for i in range(6)]
+        for column, row in now:
+            away = np.hypot(x - column - 4.5, y - row - 12.6)
+            depth, edge = (0.45, 11.5) if k % 4 == 0 else (0.15, 9.5)
+            picture *= 1.0 - depth * np.clip(edge - away, 0.0, 1.0)
+        for column, row in now:
+            cover = np.clip(9.5 - np.hypot(x - column, y - row), 0.0, 1.0)
+            picture += cover * (168.0 - picture)
+        picture = cv2.GaussianBlur(picture, (0, 0), 0.8) + rng.normal(0.0, 1.0, picture.shape)
+        gray = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+        pictures.append(np.repeat(gray[:, :, None], 3, axis=2))
+        places.append(np.array(now))
+    return pictures, places
+
+
+def test_shadows_that_are_known_do_not_compete_with_their_beads():
+    frames, places = beads_over_shadows()
+    model = scene_model(frames, BeadLook(radii=(7.5, 12.5), apart=1.25))
+    assert model.shadows is not None
+    for frame, now in zip(frames[::3], places[::3], strict=True):
+        candidates = model.candidates(frame)
+        alike = candidates.outlines.discs[model.alike(candidates)]
+        away = np.hypot(*(now[:, None, k] - alike[None, :, k] for k in range(2)))
+        assert len(alike) == len(now)
+        assert away.min(axis=1).max() < 2.0
+        assert not darken(candidates.colours, candidates.floor).any()

@@ -143,7 +143,7 @@ def ring_medians(
         Column, row, radius.
     places : ndarray (m, 2)
         From the centre, in radii: across and down.
-    values : ndarray of uint8, (m,)
+    values : ndarray of uint8, (3, m)
         Overwritten.
     medians : ndarray (n, 3)
         Written.
@@ -151,23 +151,93 @@ def ring_medians(
     rows, columns = color.shape[0] - 1.0, color.shape[1] - 1.0
     count = len(places)
     for k in range(len(discs)):
+        for i in range(count):
+            x = np.rint(discs[k, 0] + discs[k, 2] * places[i, 0])
+            y = np.rint(discs[k, 1] + discs[k, 2] * places[i, 1])
+            # NaN counts as 0.
+            column = int(min(x, columns)) if x > 0.0 else 0
+            row = int(min(y, rows)) if y > 0.0 else 0
+            for channel in range(3):
+                values[channel, i] = color[row, column, channel]
         for channel in range(3):
-            for i in range(count):
-                x = np.rint(discs[k, 0] + discs[k, 2] * places[i, 0])
-                y = np.rint(discs[k, 1] + discs[k, 2] * places[i, 1])
-                # NaN counts as 0.
-                column = int(min(x, columns)) if x > 0.0 else 0
-                row = int(min(y, rows)) if y > 0.0 else 0
-                _insert(values, i, color[row, column, channel])
-            upper, lower = float(values[count // 2]), float(values[(count - 1) // 2])
-            medians[k, channel] = 0.5 * (upper + lower)
+            medians[k, channel] = _median(values[channel])
 
 
 @inlined
-def _insert(values: NDArray[np.uint8], count: int, value: np.uint8) -> None:
-    """Insert a value into the first ones, which rise."""
-    i = count
-    while i > 0 and values[i - 1] > value:
-        values[i] = values[i - 1]
-        i -= 1
-    values[i] = value
+def _median(values: NDArray[np.uint8]) -> float:
+    """Median of a few values, by their bits: sorting takes longer."""
+    count = len(values)
+    lower = np.uint8(0)
+    for bit in range(8):
+        least = np.uint8(lower | np.uint8(128 >> bit))
+        below = 0
+        for i in range(count):
+            below += values[i] < least
+        if below <= (count - 1) // 2:
+            lower = least
+    # The next one, of an even number.
+    upper, not_above = np.uint8(255), 0
+    for i in range(count):
+        not_above += values[i] <= lower
+        upper = min(upper, values[i]) if values[i] > lower else upper
+    if not_above > count // 2:
+        upper = lower
+    return 0.5 * (float(lower) + float(upper))
+
+
+@kernel
+def lie_near(
+    places: NDArray[np.float64],
+    discs: NDArray[np.float64],
+    reach: float,
+    near: NDArray[np.bool_],
+) -> None:
+    """Find places within a distance of a disc.
+
+    Parameters
+    ----------
+    places, discs : ndarrays (n, 3) and (m, 3), [px]
+        Column and row first.
+    reach : float, [px]
+    near : ndarray (n,)
+        Written.
+    """
+    for i in range(len(places)):
+        near[i] = False
+        for k in range(len(discs)):
+            x, y = discs[k, 0] - places[i, 0], discs[k, 1] - places[i, 1]
+            if x * x + y * y <= reach * reach:
+                near[i] = True
+                break
+
+
+@kernel
+def have_near(
+    features: NDArray[np.float64],
+    known: NDArray[np.float64],
+    limits: NDArray[np.float64],
+    count: int,
+    near: NDArray[np.bool_],
+) -> None:
+    """Find features with at least so many known ones nearer than a limit.
+
+    Parameters
+    ----------
+    features, known : ndarrays (n, d) and (m, d)
+    limits : ndarray (n,)
+    count : int
+    near : ndarray (n,)
+        Written.
+    """
+    for i in range(len(features)):
+        found = 0
+        for k in range(len(known)):
+            square = 0.0
+            for j in range(known.shape[1]):
+                off = features[i, j] - known[k, j]
+                square += off * off
+            if square < limits[i] * limits[i]:
+                found += 1
+                if found >= count:
+                    break
+        near[i] = found >= count

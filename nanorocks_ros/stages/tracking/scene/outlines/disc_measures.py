@@ -73,7 +73,7 @@ def ring_colours(
         [np.outer(parts, np.cos(turns)).ravel(), np.outer(parts, np.sin(turns)).ravel()], axis=1
     )
     medians = np.empty((len(discs), 3))
-    values = np.empty(len(places), dtype=np.uint8)
+    values = np.empty((3, len(places)), dtype=np.uint8)
     ring_medians(np.ascontiguousarray(color), np.ascontiguousarray(discs), places, values, medians)
     return medians
 

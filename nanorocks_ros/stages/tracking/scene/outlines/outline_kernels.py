@@ -21,6 +21,8 @@ RESULTS = 9
 # Samples along a ray are this far apart at least, [px], and so many at most, by iteration.
 _SAMPLE_PX, _MAX_SAMPLES = 0.5, (16, 24)
 _LEAST_REACH_PX = 1.5
+# Places and values between pixels as integers, over these units.
+_PLACE, _VALUE = 2.0**32, 2.0**-24
 # Edges this far from the outline do not count: part of the radius, and at least, [px].
 _OFF_SHARE, _OFF_PX = 0.12, 0.8
 # Smallest scatter of an edge, [px], and edges that tell an outline.
@@ -111,6 +113,7 @@ def fit_each(
             results[k, i] = discs[k, i] if i < 3 else 0.0
         for term in range(terms):
             work.fitted[term] = 0.0
+        scatter = 0.0
         for turn in range(len(reaches)):
             if turn > 0 and results[k, 5] < _LEAST_SUPPORT:
                 break
@@ -122,7 +125,8 @@ def fit_each(
                 for term in range(3, terms):
                     middle += work.fitted[term] * search.shape[ray, term]
                 _edge(picture, results, k, search, ray, middle, half_width, samples, work)
-            _fit(search, results, k, work)
+            scatter = _fit(search, results, k, work)
+        _write_errors(search, results, k, scatter, work)
 
 
 @inlined
@@ -140,11 +144,22 @@ def _edge(
     """Distance of the edge on a ray of disc `k`, its step, and 1 where there is one."""
     pitch = 2.0 / (samples - 1)
     across, down = search.shape[ray, 0], search.shape[ray, 1]
-    for i in range(samples):
-        along = max(middle + half_width * (i * pitch - 1.0), 0.0)
-        work.profile[i] = _value(
-            picture, results[k, 0] + across * along, results[k, 1] + down * along
-        )
+    within, usable = middle >= half_width, True
+    column, row = results[k, 0], results[k, 1]
+    for end in range(2):
+        along = max(middle + (2 * end - 1) * half_width, 0.0)
+        x, y = column + across * along, row + down * along
+        usable &= 0.0 <= x < picture.shape[1] and 0.0 <= y < picture.shape[0]
+        within &= 1e-3 <= x < picture.shape[1] - 1.001 and 1e-3 <= y < picture.shape[0] - 1.001
+    if within:
+        # Between two places in the picture all are.
+        first, step = middle - half_width, half_width * pitch
+        start = column + across * first, row + down * first
+        _sample(picture, start, (across * step, down * step), samples, work.profile)
+    else:
+        for i in range(samples):
+            along = max(middle + half_width * (i * pitch - 1.0), 0.0)
+            work.profile[i] = _value(picture, column + across * along, row + down * along)
     # Step over a length of about two pixels.
     half = max(1, round(1.0 / (pitch * half_width)))
     count = samples - 2 * half
@@ -157,11 +172,7 @@ def _edge(
     shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
     place = (best + half) * pitch - 1.0 + pitch * min(max(shift, -0.5), 0.5)
     work.edges[ray, 0], work.edges[ray, 1] = middle + half_width * place, at
-    usable = at > search.least and at >= before and at >= after
-    for end in range(2):
-        along = max(middle + (2 * end - 1) * half_width, 0.0)
-        x, y = results[k, 0] + across * along, results[k, 1] + down * along
-        usable &= 0.0 <= x < picture.shape[1] and 0.0 <= y < picture.shape[0]
+    usable &= at > search.least and at >= before and at >= after
     work.edges[ray, 2] = 1.0 if usable else 0.0
 
 
@@ -196,8 +207,40 @@ def _value(picture: NDArray[np.uint8], x: float, y: float) -> float:
 
 
 @inlined
-def _fit(search: Search, results: NDArray[np.float64], k: int, work: Scratch) -> None:
-    """The outline through the edges, without those that lie off, as linear least squares."""
+def _sample(
+    picture: NDArray[np.uint8],
+    start: tuple[float, float],
+    step: tuple[float, float],
+    count: int,
+    profile: NDArray[np.float64],
+) -> None:
+    """The picture at so many places from a start on, all of them within it.
+
+    In integers: conversions from and to floats would take most of the time. A place has 32 bits
+    after the point, of which the weights of its neighbours have 12.
+    """
+    # Negative steps are those modulo 2**64.
+    x, y = np.uint64(np.int64(start[0] * _PLACE)), np.uint64(np.int64(start[1] * _PLACE))
+    across, down = np.uint64(np.int64(step[0] * _PLACE)), np.uint64(np.int64(step[1] * _PLACE))
+    one, whole, fraction = np.uint64(1), np.uint64(32), np.uint64(20)
+    full, mask = np.uint64(4096), np.uint64(4095)
+    for i in range(count):
+        column, row = x >> whole, y >> whole
+        right, below = (x >> fraction) & mask, (y >> fraction) & mask
+        left, above = full - right, full - below
+        upper = left * picture[row, column] + right * picture[row, column + one]
+        lower = left * picture[row + one, column] + right * picture[row + one, column + one]
+        profile[i] = np.float64(np.int64(above * upper + below * lower)) * _VALUE
+        x += across
+        y += down
+
+
+@inlined
+def _fit(search: Search, results: NDArray[np.float64], k: int, work: Scratch) -> float:
+    """The outline through the edges, without those that lie off, as linear least squares.
+
+    Returns the scatter of the edges.
+    """
     terms = search.shape.shape[1]
     edges, weights, off, fitted = work.edges, work.weights, work.off, work.fitted
     for ray in range(RAYS):
@@ -228,7 +271,14 @@ def _fit(search: Search, results: NDArray[np.float64], k: int, work: Scratch) ->
     else:
         for term in range(3, terms):
             fitted[term] = 0.0
-    scatter = max(math.sqrt(squares / max(count - terms, 1)), _LEAST_SCATTER_PX)
+    return max(math.sqrt(squares / max(count - terms, 1)), _LEAST_SCATTER_PX)
+
+
+@inlined
+def _write_errors(
+    search: Search, results: NDArray[np.float64], k: int, scatter: float, work: Scratch
+) -> None:
+    """Errors of place and radius of disc `k`, from the scatter of the edges."""
     _sum_up(search.shape, work, 1e-6)
     variance = scatter * scatter * _CORRELATION_FACTOR
     place = 0.5 * (_variance(work, 0) + _variance(work, 1))
@@ -261,20 +311,38 @@ def _longest_gap(weights: NDArray[np.float64]) -> int:
 
 @inlined
 def _sum_up(shape: NDArray[np.float64], work: Scratch, ridge: float) -> None:
-    """Normal equations of the edges."""
+    """Normal equations of the edges: those of the circle in registers, smear in arrays."""
     normal, right = work.normal, work.right
     terms = len(right)
-    for i in range(terms):
+    for i in range(3, terms):
         right[i] = 0.0
-        for j in range(terms):
+        for j in range(i + 1):
             normal[i, j] = ridge if i == j else 0.0
+    xx, yx, yy, x, y, count = ridge, 0.0, ridge, 0.0, 0.0, ridge
+    right_x, right_y, right_radius = 0.0, 0.0, 0.0
     for ray in range(RAYS):
-        if work.weights[ray] > 0.0:
-            for i in range(terms):
-                part = work.weights[ray] * shape[ray, i]
-                right[i] += part * work.edges[ray, 0]
-                for j in range(i + 1):
-                    normal[i, j] += part * shape[ray, j]
+        weight = work.weights[ray]
+        if not weight > 0.0:
+            continue
+        across, down, distance = shape[ray, 0], shape[ray, 1], work.edges[ray, 0]
+        part_x, part_y = weight * across, weight * down
+        xx += part_x * across
+        yx += part_y * across
+        yy += part_y * down
+        x += part_x
+        y += part_y
+        count += weight
+        right_x += part_x * distance
+        right_y += part_y * distance
+        right_radius += weight * distance
+        for i in range(3, terms):
+            part = weight * shape[ray, i]
+            right[i] += part * distance
+            for j in range(i + 1):
+                normal[i, j] += part * shape[ray, j]
+    normal[0, 0], normal[1, 0], normal[1, 1] = xx, yx, yy
+    normal[2, 0], normal[2, 1], normal[2, 2] = x, y, count
+    right[0], right[1], right[2] = right_x, right_y, right_radius
     for i in range(terms):
         for j in range(i):
             normal[j, i] = normal[i, j]

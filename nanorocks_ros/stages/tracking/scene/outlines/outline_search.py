@@ -9,8 +9,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import lie_near
 from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import join_outlines
 from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import centres_of_all_sizes
 from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import fit_outlines
@@ -32,7 +32,9 @@ _LEAST_STEP = 0.35
 # And above so many times the noise.
 _LEAST_NOISES = 4.0
 # A search begins where a bead is expected, and not again within this part of its radius where
-# that shows an outline with this support and step over the usual one.
+# that shows an outline with this support and step over the usual one, and of the radius that is
+# expected, whose logarithm differs by less than this.
+_SAME_SIZE = 0.12
 _SAME_SHARE, _SURE_SUPPORT, _SURE_STEP = 0.8, 0.7, 0.5
 # Shadows have wide edges, which vote for more than an outline, and may lie over a clear bead: so
 # many places beside them, so many radii away, are searched, too.
@@ -58,12 +60,11 @@ def search_outlines(
         1 where something moves: discs that are smeared there are found, too.
     """
     expected = np.empty((0, 3)) if hints is None else hints
-    centres = centres_of_all_sizes(picture, voting, _LEAST_VOTES)
     at_hints = fit_outlines(picture, expected, voting)
-    sure = at_hints.discs[are_sure(at_hints, voting.step)]
-    if len(sure):
-        apart_from_sure = cKDTree(sure[:, :2]).query(centres[:, :2])[0]
-        centres = centres[apart_from_sure > _SAME_SHARE * voting.smallest]
+    # A bead keeps its size: of another one is a circle through edges of neighbours.
+    same_size = np.abs(np.log(at_hints.discs[:, 2] / expected[:, 2])) < _SAME_SIZE
+    sure = at_hints.discs[are_sure(at_hints, voting.step) & same_size]
+    centres = _away(centres_of_all_sizes(picture, voting, _LEAST_VOTES), sure, voting)
     starts, votes = centres[:, :3], centres[:, 3]
     at_starts = fit_outlines(picture, starts, voting)
     beside = _beside(starts[(votes > _SOFT_VOTES) & ~are_sure(at_starts, voting.step)])
@@ -86,6 +87,15 @@ def are_sure(outlines: Outlines, usual: float) -> NDArray[np.bool_]:
     """Which outlines show well, by the usual step."""
     sure = outlines.support >= _SURE_SUPPORT
     return np.asarray(sure & (outlines.steps >= _SURE_STEP * usual))
+
+
+def _away(
+    places: NDArray[np.float64], sure: NDArray[np.float64], voting: Voting
+) -> NDArray[np.float64]:
+    """Places that are not those of discs that show well."""
+    near = np.empty(len(places), dtype=bool)
+    lie_near(np.ascontiguousarray(places), sure, _SAME_SHARE * voting.smallest, near)
+    return np.asarray(places[~near])
 
 
 def _beside(starts: NDArray[np.float64]) -> NDArray[np.float64]:

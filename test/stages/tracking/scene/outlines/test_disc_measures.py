@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import lie_near
 from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import apart, ring_colours
 from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
@@ -31,11 +35,12 @@ def test_discs_one_distance_apart_are_all_kept():
     assert apart(outlines_of(places, np.full(400, 0.9)), 2.0).all()
 
 
-def test_the_colour_of_a_circle_is_the_median_of_its_pixels():
+@pytest.mark.parametrize('parts', [(0.5, 1.2), (0.5,), (0.15, 0.45, 0.7)])
+@pytest.mark.parametrize('levels', [2, 256])
+def test_the_colour_of_a_circle_is_the_median_of_its_pixels(parts, levels):
     rng = np.random.default_rng(1)
-    color = rng.integers(0, 256, (60, 80, 3), dtype=np.uint8)
+    color = rng.integers(256 - levels, 256, (60, 80, 3), dtype=np.uint8)
     discs = np.column_stack([rng.uniform(-3, 83, 50), rng.uniform(-3, 63, 50), np.full(50, 6.0)])
-    parts = 0.5, 1.2
     turns = np.arange(8) * 0.25 * np.pi
     expected = []
     for column, row, radius in discs:
@@ -55,3 +60,13 @@ def test_the_colour_of_a_disc_that_is_nowhere_is_that_of_a_corner():
     color[0, 0] = 9
     nowhere = np.array([[np.nan, np.nan, 3.0]])
     assert ring_colours(color, nowhere, (0.5,)).tolist() == [[9.0, 9.0, 9.0]]
+
+
+@given(st.integers(0, 12), st.integers(0, 12), st.floats(0.0, 30.0), st.integers(0, 1000))
+def test_places_are_near_when_a_disc_is_within_reach(count, discs, reach, seed):
+    rng = np.random.default_rng(seed)
+    places, others = rng.uniform(0.0, 50.0, (count, 3)), rng.uniform(0.0, 50.0, (discs, 3))
+    near = np.empty(count, dtype=bool)
+    lie_near(places, others, reach, near)
+    away = np.hypot(*(places[:, None, k] - others[None, :, k] for k in range(2)))
+    assert near.tolist() == (away <= reach).any(axis=1).tolist()

@@ -72,3 +72,19 @@ def test_discs_that_are_nowhere_and_pictures_of_a_pixel_have_no_support():
     assert (fit_outlines(drawn([]), nowhere, VOTING).support == 0.0).all()
     pixel = np.full((1, 1), 90, np.uint8)
     assert (fit_outlines(pixel, np.array([[0.0, 0.0, 10.0]]), VOTING).support == 0.0).all()
+
+
+def test_beyond_the_border_of_the_picture_the_circle_is_the_same():
+    # Rays that leave the picture are sampled in another way than those within.
+    discs = grid_of_discs()
+    picture = drawn(discs)
+    whole = fit_outlines(picture, discs, VOTING)
+    left = discs[:, 0] < 40.0
+    column = int((discs[left, 0] - discs[left, 2]).min()) - 1
+    shift = np.array([column, 0.0, 0.0])
+    cut = fit_outlines(picture[:, column:], discs[left] - shift, VOTING)
+    rays_lost = cut.support < whole.support[left]
+    assert rays_lost.any()
+    assert np.abs(cut.discs + shift - whole.discs[left]).max() < 0.15
+    within = fit_outlines(picture[:, column:], discs[~left] - shift, VOTING)
+    np.testing.assert_allclose(within.discs + shift, whole.discs[~left], rtol=0.0, atol=1e-3)
