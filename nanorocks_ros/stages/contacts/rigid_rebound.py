@@ -1,10 +1,10 @@
 """Fit of a body of several beads that rebounds from a side wall, in the projection of the camera.
 
-Before and after the contact the body moves freely: its centre on a straight line, its beads turned
-at a constant rate about it. The impulse of a smooth wall passes through the centre of the bead
-that touches, so that mass and tensor of inertia turn it into both changes of velocity, and the
-normal speed of the wall contact is that of the centre of that bead. Heights of beads are not seen;
-they are fitted with the spread that the tray allows.
+Before and after the contact the body moves freely: its centre on a straight line, its beads about
+it with a constant angular momentum. The impulse of a smooth wall passes through the centre of the
+bead that touches, so that mass and tensor of inertia turn it into both changes of velocity, and
+the normal speed of the wall contact is that of the centre of that bead. Heights of beads are not
+seen; they are fitted with the spread that the tray allows.
 
 Tested by ``test/stages/contacts/test_body_rebounds.py``.
 """
@@ -235,6 +235,7 @@ class _Fit:
         ):
             move_freely(
                 (motion.centre, motion.arms),
+                (self._shares, frames.radii),
                 (velocity, spin),
                 frames.times[rows] - motion.time,
                 expected[rows],
