@@ -6,7 +6,7 @@ Tested by ``test/stages/contacts/test_body_rebounds.py``.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -123,7 +123,7 @@ def move_freely(
 @compiled
 def _turn(
     turned: NDArray[np.float64],
-    inverse: NDArray[np.float64],
+    inverse: NDArray[np.floating[Any]],
     momentum: NDArray[np.float64],
     time: float,
 ) -> None:
@@ -154,7 +154,9 @@ def _turn(
 
 @compiled
 def _slope(
-    turned: NDArray[np.float64], inverse: NDArray[np.float64], momentum: NDArray[np.float64]
+    turned: NDArray[np.float64],
+    inverse: NDArray[np.floating[Any]],
+    momentum: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Change of a rotation in time, (3, 3), [1/s]: the spin follows from the momentum."""
     spin = turned @ (inverse @ (turned.T @ momentum))
