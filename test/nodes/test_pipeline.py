@@ -143,14 +143,15 @@ def test_a_namespace_moves_the_whole_graph(graph):
 
 def test_the_pipeline_takes_a_camera_topic_and_sets_the_epoch_itself(graph):
     arrays = ResultArrays(graph.node)
-    process = graph.start('pipeline', 'source:=topic', 'transport:=compressed')
+    # Clusters wait a second longer than bodies.
+    options = 'transport:=compressed', 'bodies.delay:=1.0'
+    process = graph.start('pipeline', 'source:=topic', *options)
     name = graph.node.resolve_topic_name(topics.RAW_COMPRESSED.name)
     publisher = graph.node.create_publisher(
         CompressedImage, topics.RAW_COMPRESSED.name, qos_of(topics.RAW_COMPRESSED)
     )
     graph.until(lambda: graph.node.count_subscribers(name) == 1)
     graph.until(lambda: publisher.get_subscription_count() == 1)
-    # Those of clusters are held back for two seconds.
     for frame in itertools.islice(BagFrames(SAMPLE).frames(), 120):
         jpeg = encode_jpeg(frame.image, 90)
         publisher.publish(compressed_message(frame.stamp_ns, 'camera', jpeg))
