@@ -12,7 +12,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from nanorocks_ros.records.cluster_estimates import sizes_disagree
-from nanorocks_ros.records.headlines import Headline, reason_for_contacts
+from nanorocks_ros.records.headlines import CONTRADICTED, Headline, reason_for_contacts
 from nanorocks_ros.records.quality_flags import (
     CorRelation,
     CorStatus,
@@ -112,8 +112,7 @@ FLAGS = {
         'the restitutions are those of contacts alone; compare acceleration with the flight log',
     ),
     Quality.SPEED_DEPENDENT: Words(
-        'contacts at different speeds contradict a constant restitution, in 5 % of cycles by '
-        'chance',
+        CONTRADICTED,
         'the restitutions are those of contacts alone, and lose as much energy in the contacts '
         'that were seen; impact_restitution and wall_impact_restitution are those at impact_speed '
         'and wall_impact_speed, the exponents say how 1 - restitution goes with speed, '
