@@ -186,32 +186,6 @@ def _median(values: NDArray[np.uint8]) -> float:
 
 
 @kernel
-def lie_near(
-    places: NDArray[np.float64],
-    discs: NDArray[np.float64],
-    reach: float,
-    near: NDArray[np.bool_],
-) -> None:
-    """Find places within a distance of a disc.
-
-    Parameters
-    ----------
-    places, discs : ndarrays (n, 3) and (m, 3), [px]
-        Column and row first.
-    reach : float, [px]
-    near : ndarray (n,)
-        Written.
-    """
-    for i in range(len(places)):
-        near[i] = False
-        for k in range(len(discs)):
-            x, y = discs[k, 0] - places[i, 0], discs[k, 1] - places[i, 1]
-            if x * x + y * y <= reach * reach:
-                near[i] = True
-                break
-
-
-@kernel
 def have_near(
     features: NDArray[np.float64],
     known: NDArray[np.float64],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import lie_near
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import have_near
 from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import join_outlines
 from nanorocks_ros.stages.tracking.scene.outlines.edge_votes import centres_of_all_sizes
 from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import fit_outlines
@@ -94,7 +94,8 @@ def _away(
 ) -> NDArray[np.float64]:
     """Places that are not those of discs that show well."""
     near = np.empty(len(places), dtype=bool)
-    lie_near(np.ascontiguousarray(places), sure, _SAME_SHARE * voting.smallest, near)
+    centres, known = (np.ascontiguousarray(discs[:, :2]) for discs in (places, sure))
+    have_near(centres, known, np.full(len(places), _SAME_SHARE * voting.smallest), 1, near)
     return np.asarray(places[~near])
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import lie_near
+from nanorocks_ros.stages.tracking.scene.outlines.disc_kernels import have_near
 from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import apart, ring_colours
 from nanorocks_ros.stages.tracking.scene.outlines.outline_fits import Outlines
 
@@ -62,11 +62,17 @@ def test_the_colour_of_a_disc_that_is_nowhere_is_that_of_a_corner():
     assert ring_colours(color, nowhere, (0.5,)).tolist() == [[9.0, 9.0, 9.0]]
 
 
-@given(st.integers(0, 12), st.integers(0, 12), st.floats(0.0, 30.0), st.integers(0, 1000))
-def test_places_are_near_when_a_disc_is_within_reach(count, discs, reach, seed):
+@given(
+    st.integers(0, 12),
+    st.integers(0, 12),
+    st.floats(0.0, 30.0),
+    st.integers(1, 3),
+    st.integers(0, 1000),
+)
+def test_places_are_near_when_enough_others_are_within_reach(count, others, reach, least, seed):
     rng = np.random.default_rng(seed)
-    places, others = rng.uniform(0.0, 50.0, (count, 3)), rng.uniform(0.0, 50.0, (discs, 3))
+    places, known = rng.uniform(0.0, 50.0, (count, 2)), rng.uniform(0.0, 50.0, (others, 2))
     near = np.empty(count, dtype=bool)
-    lie_near(places, others, reach, near)
-    away = np.hypot(*(places[:, None, k] - others[None, :, k] for k in range(2)))
-    assert near.tolist() == (away <= reach).any(axis=1).tolist()
+    have_near(places, known, np.full(count, reach), least, near)
+    away = np.hypot(*(places[:, None, k] - known[None, :, k] for k in range(2)))
+    assert near.tolist() == ((away < reach).sum(axis=1) >= least).tolist()
