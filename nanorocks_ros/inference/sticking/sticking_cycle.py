@@ -5,7 +5,7 @@ Tested by ``test/inference/sticking/test_sticking_speed.py``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import Merge
 
 _NS = 1e9
+# Part of the merges that are known within the path that is left to the end.
+_MOST = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +57,8 @@ def sticking_cycle(
 ) -> StickingCycle:
     """Cycle from the merges of a `BodyCounter` and the speeds of the beads.
 
+    It ends where later merges are not known yet: see `_while_merges_show`.
+
     Parameters
     ----------
     beads : int
@@ -74,9 +78,46 @@ def sticking_cycle(
     # merge are nodes of the integral.
     times = np.sort(np.concatenate([sample_times, inside, np.nextafter(inside, np.inf)]))
     merged = np.searchsorted(inside, times, side='left')
-    return StickingCycle(
+    cycle = StickingCycle(
         times=times,
         speeds=np.interp(times, sample_times[1:], speeds),
         bodies=beads - merged.astype(np.float64),
         merges=inside,
+    )
+    known = [
+        ((merge.stamp_ns - start_ns) / _NS, (merge.known_ns - start_ns) / _NS)
+        for merge in merges
+        if merge.joins and (merge.stamp_ns - start_ns) / _NS <= end
+    ]
+    return _while_merges_show(cycle, np.array(known).reshape(-1, 2))
+
+
+def _while_merges_show(cycle: StickingCycle, known: NDArray[np.float64]) -> StickingCycle:
+    """The part of a cycle whose merges are known by its end.
+
+    A merge is known once free beads would have parted, which takes a path, not a time: the slower
+    the gas, the longer. Of merges with a shorter path to the end many are missing: as bodies that
+    did not merge they would speak for too low a sticking speed. The first merge always counts.
+
+    Parameters
+    ----------
+    cycle : StickingCycle
+    known : ndarray (m, 2), [s]
+        For each merge since when the beads are beside each other, and when it was known.
+    """
+    if not known.size:
+        return cycle
+    # Trapezoidal rule.
+    steps = 0.5 * (cycle.speeds[1:] + cycle.speeds[:-1]) * np.diff(cycle.times)
+    path = np.append(0.0, np.cumsum(steps))
+    began, ended = (np.interp(times, cycle.times, path) for times in known.T)
+    needed = float(np.quantile(ended - began, _MOST))
+    shows = (path <= path[-1] - needed) | (cycle.times <= cycle.merges[0])
+    last = cycle.times[shows][-1]
+    return replace(
+        cycle,
+        times=cycle.times[shows],
+        speeds=cycle.speeds[shows],
+        bodies=cycle.bodies[shows],
+        merges=cycle.merges[cycle.merges <= last],
     )

@@ -134,7 +134,9 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         due = self._due_estimates(record.stamp_ns)
         if self._tracks_break_often():
             return estimates
-        merges = [self._merge(bond, record.stamp_ns) for bond in self._without_doubles(bonds)]
+        bonds = self._without_doubles(bonds)
+        odds = self._merges_per_encounter(len(bonds))
+        merges = [self._merge(_since_met(bond, odds), record.stamp_ns) for bond in bonds]
         return (*estimates, *merges, *due)
 
     def _comoving_bonds(self, time: float, tracks: Tracks, beads: SeenBeads) -> list[Bond]:
@@ -246,10 +248,10 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
             self._next_due_ns = tracks.stamp_ns + round(self._settings.interval * _NS)
             self._held_back.append(frame)
 
-    def _merges_per_encounter(self) -> float:
-        """Merges per encounter in this cycle so far."""
+    def _merges_per_encounter(self, new_bonds: int = 0) -> float:
+        """Merges per encounter in this cycle so far, with new ones."""
         met = 0.5 * self._tray.count * self._encounter_rate * self._path
-        return (len(self._bonds) + _PRIOR_MERGES) / max(met, 1.0)
+        return (len(self._bonds) + new_bonds + _PRIOR_MERGES) / max(met, 1.0)
 
     def _max_free_chance(self) -> float:
         """Probability of free beads below which a pair is a bond.
@@ -323,3 +325,17 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
             clusters=statistics.clusters,
             sizes=statistics.counts,
         )
+
+
+def _since_met(bond: Bond, odds: float) -> Bond:
+    """The bond, dated to when its beads met if they have more probably stuck since then.
+
+    They may have turned, and kept their separation only later.
+
+    Parameters
+    ----------
+    bond : Bond
+    odds : float
+        Merges per encounter.
+    """
+    return bond._replace(start=min(bond.start, bond.met)) if bond.met_chance < odds else bond

@@ -42,7 +42,10 @@ SMALLER_RADIUS, DEFLECTED = 20, 21
 COLLISION_PATH = 22
 """Column of the path since the last restart, at the speed of the gas at each time."""
 
-_COLUMNS = 23
+PATH_BEFORE = 23
+"""Column of the path of free beads from when the pair met to the last restart."""
+
+_COLUMNS = 24
 
 
 class PairTable(NamedTuple):
@@ -259,6 +262,7 @@ def restart_pair(row: NDArray[np.float64], time: float) -> None:
     for c in range(2):
         row[LOW + c] = row[HIGH + c] = row[OFFSET + c] = row[SMOOTHED + c]
     row[PATH], row[COLLISION_PATH], row[START], row[LAST_TOGETHER] = 0.0, 0.0, time, time
+    row[PATH_BEFORE] = row[TURNING_PATH]
 
 
 @compiled
@@ -273,7 +277,7 @@ def _start_pair(
     restart_pair(row, time)
     distance = math.sqrt(row[SMOOTHED] * row[SMOOTHED] + row[SMOOTHED + 1] * row[SMOOTHED + 1])
     row[DISTANCE] = row[NEAREST] = row[FARTHEST] = distance
-    row[TURNING_PATH], row[MET], row[LAST_TOUCHING] = 0.0, time, time
+    row[TURNING_PATH], row[PATH_BEFORE], row[MET], row[LAST_TOUCHING] = 0.0, 0.0, time, time
     row[SMALLER_RADIUS] = min(beads.radii[i], beads.radii[j])
     low = min(beads.variances[i], beads.variances[j])
     high = max(beads.variances[i], beads.variances[j])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from nanorocks_ros.stages.bodies.bond_kernels import (
     NEAREST,
     OFFSET,
     PATH,
+    PATH_BEFORE,
     SMALLER_RADIUS,
     SMOOTHED,
     START,
@@ -59,12 +61,18 @@ class Bond(NamedTuple):
     offset : tuple of 2 floats, [m]
         From the first centre to the second.
     tolerance : float, [m]
+    met : float, [s]
+        Time since which they are beside each other; infinite where it is not known to be earlier.
+    met_chance : float, 0 to 1
+        Probability that free beads were beside each other from `met` to `start`.
     """
 
     ids: tuple[int, int]
     start: float
     offset: tuple[float, float]
     tolerance: float
+    met: float = math.inf
+    met_chance: float = 1.0
 
 
 class BondFinder:
@@ -145,12 +153,14 @@ class BondFinder:
         ranges = np.maximum(ranges, _MIN_RANGE * rows[:, TOLERANCE])
         return chance_probability(rows[:, PATH], ranges, self._rate, rows[:, COLLISION_PATH])
 
-    def _turning_chances(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _turning_chances(
+        self, rows: NDArray[np.float64], path: int = TURNING_PATH
+    ) -> NDArray[np.float64]:
         """Probabilities that free beads keep their distance within the range that was seen."""
         least = 2.0 * _MIN_RANGE * rows[:, TOLERANCE]
         farthest = np.maximum(rows[:, FARTHEST], rows[:, NEAREST] + least)
         return turning_chance_probability(
-            rows[:, TURNING_PATH],
+            rows[:, path],
             rows[:, NEAREST],
             farthest,
             self._parting * self._collision_rate(rows[:, SMALLER_RADIUS], rows[:, DEFLECTED]),
@@ -165,8 +175,12 @@ class BondFinder:
         chances = self._fixed_chances(values[rows])
         is_fixed = (chances < max_chance) & (time - values[rows, START] >= _MIN_AGE)
         is_bond = is_fixed | (self._turning_chances(values[rows]) < max_chance)
+        rows, is_fixed = rows[is_bond], is_fixed[is_bond]
+        before = self._turning_chances(values[rows], PATH_BEFORE)
         bonds = []
-        for k, fixed in zip(rows[is_bond].tolist(), is_fixed[is_bond].tolist(), strict=True):
+        for k, fixed, chance in zip(
+            rows.tolist(), is_fixed.tolist(), before.tolist(), strict=True
+        ):
             row = values[k]
             bonded[k], row[LAST_TOGETHER] = True, time
             row[OFFSET : OFFSET + 2] = (
@@ -175,8 +189,10 @@ class BondFinder:
                 else row[SMOOTHED : SMOOTHED + 2]
             )
             offset = (float(row[OFFSET]), float(row[OFFSET + 1]))
-            start = float(row[START] if fixed else row[MET])
-            bonds.append(Bond(_ids_of(keys[k]), start, offset, float(row[TOLERANCE])))
+            met = float(row[MET])
+            start, chance = (float(row[START]), chance) if fixed else (met, 0.0)
+            tolerance = float(row[TOLERANCE])
+            bonds.append(Bond(_ids_of(keys[k]), start, offset, tolerance, met, chance))
         return bonds
 
     def _broken_bonds(self, time: float) -> list[tuple[int, int]]:

@@ -124,11 +124,11 @@ def test_a_lower_limit_alone_leaves_as_much_below_it_as_an_interval():
     assert drop == pytest.approx(0.5 * 1.96**2, abs=0.05)
 
 
-def _merge(seconds, joins=True):
+def _merge(seconds, joins=True, known=None):
     stamp_ns = START + round(seconds * 1e9)
     return Merge(
         stamp_ns=stamp_ns,
-        known_ns=stamp_ns,
+        known_ns=stamp_ns if known is None else START + round(known * 1e9),
         tray=1,
         cycle=1,
         tracks=np.array([1, 2], dtype=np.int32),
@@ -145,6 +145,46 @@ def test_a_cycle_has_the_merges_up_to_the_last_known_speed():
     assert cycle.bodies[-1] == 13.0
     assert cycle.bodies[np.searchsorted(cycle.times, 3.0)] == 14.0
     assert cycle.speeds[0] == 5e-3
+
+
+def test_a_cycle_ends_where_the_path_to_know_a_merge_is_not_covered():
+    # Steps of 10 mm at first, 1 mm from 6 s on: a merge is known after 15 mm.
+    stamps = START + np.arange(1, 17) * 1_000_000_000
+    speeds = np.where(np.arange(1, 17) < 6, 1e-2, 1e-3)
+    merges = [_merge(1.0, known=2.5), _merge(2.0, known=3.5), _merge(4.0, known=5.0)]
+    cycle = sticking_cycle(BEADS, merges, stamps, speeds, START)
+    path_left = np.interp(16.0, [0.0, 5.0, 6.0, 16.0], [0.0, 50e-3, 55.5e-3, 65.5e-3]) - 15e-3
+    assert cycle.times[-1] == 5.0
+    assert 1e-2 * cycle.times[-1] <= path_left < 1e-2 * (cycle.times[-1] + 1.0)
+    assert cycle.merges.tolist() == [1.0, 2.0, 4.0]
+
+
+def test_the_first_merge_counts_though_others_may_be_missing():
+    stamps = START + np.arange(1, 11) * 1_000_000_000
+    cycle = sticking_cycle(BEADS, [_merge(3.5, known=9.5)], stamps, np.full(10, 1e-2), START)
+    assert cycle.merges.tolist() == [3.5]
+    assert cycle.times[-1] < 4.0 + 1e-6
+
+
+def test_merges_that_a_slow_gas_hides_do_not_lower_the_sticking_speed():
+    rng = np.random.default_rng(4)
+    path = np.append(0.0, np.cumsum(0.5 * (SPEEDS[1:] + SPEEDS[:-1]) * np.diff(TIMES)))
+    stamps = START + np.rint(TIMES[1:] * 1e9).astype(np.int64)
+    estimates = []
+    for _ in range(40):
+        merges = _cycle(rng, 2e-3).merges
+        known = np.interp(merges, TIMES, path) + rng.gamma(4.0, 8e-3, merges.size)
+        seen = [
+            _merge(time, known=np.interp(end, path, TIMES))
+            for time, end in zip(merges, known, strict=True)
+            if end < path[-1]
+        ]
+        cycle = sticking_cycle(BEADS, seen, stamps, SPEEDS[1:], START)
+        estimates.append(sticking_estimate([cycle], CONTACTS, BEADS))
+    held = np.mean([estimate.lower <= 2e-3 <= estimate.upper for estimate in estimates])
+    assert held > 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / 40)
+    values = [estimate.sticking_speed for estimate in estimates]
+    assert np.nanmean(values) == pytest.approx(2e-3, rel=0.15)
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,17 @@ def test_the_first_merge_has_the_time_of_the_simulated_one(sticky):
     assert sum(merge.joins for merge in merges) == 15 - counts[-1].bodies.value
 
 
+def test_merges_of_bodies_that_turned_before_any_was_known_are_dated_to_when_beads_met():
+    # All sticks within a second, and the first body is known after more than two.
+    cycle = simulated(5, 3, seconds=4.0, sticking_speed=10.4e-3)
+    assert min(merge.known_ns for merge in cycle.merges) > 2.0 * NS
+    merged = -np.diff(cycle.bodies, prepend=80).astype(np.int64)
+    true = np.repeat(cycle.times, merged)
+    dated = np.sort([merge.stamp_ns / NS for merge in cycle.merges if merge.joins])
+    assert dated.size > 70
+    assert np.abs(dated - true[: dated.size]).mean() < 0.1
+
+
 def test_a_gas_without_sticking_has_no_merge_and_fifteen_bodies():
     frames = [tracks for tracks, _ in _gas(0.0, 20.0, restitution=0.7)]
     counts, merges = _estimates_and_merges(frames)

@@ -58,3 +58,22 @@ def test_an_added_bond_is_tracked_until_it_breaks(finder):
     assert _pushed(finder, lambda _: far, 1, 30) == ([], [])
     _, broken = _pushed(finder, lambda k: [(0.0, 0.0), (1.8e-3 + 1e-4 * (k - 30), 0.0)], 31, 60)
     assert broken == [(0, 1)]
+
+
+def test_a_pair_that_turned_first_says_since_when_it_is_beside_each_other():
+    # Turns in space for 1.5 s, and keeps its separation from then on.
+    finder = BondFinder(300.0, lambda radii, _: np.full_like(radii, 300.0), 0.75)
+    bonds = []
+    for k in range(120):
+        angle = 2.0 * min(k * STEP, 1.5)
+        distance = 1e-3 * (0.8 + 0.2 * np.cos(2.0 * angle))
+        second = (distance * np.cos(angle), distance * np.sin(angle))
+        beads = _beads([(0.0, 0.0), second])
+        beads = beads._replace(variances=np.full(2, 9e-6), height=4.0 * RADIUS)
+        bonds += finder.push(k * STEP, beads, 1e-5)[0]
+    assert [bond.ids for bond in bonds] == [(0, 1)]
+    (bond,) = bonds
+    assert bond.start == pytest.approx(1.5, abs=0.2)
+    assert bond.met == 0.0
+    # Free beads would have covered 6 mm by then, and few of them would not have been parted.
+    assert bond.met_chance < 0.05
