@@ -59,6 +59,7 @@ ALL = (
     'contacts',
     'sticking',
     'sticking_films',
+    'drawn_sticking',
     'turning_bodies',
     'rotating_aggregates',
     'stuck_restitution',

@@ -2,7 +2,7 @@
 
 One tray in a video file, with light, lens, sensor, codec, scale and frame rate drawn
 (``--effects drawn``), and beads, walls, height, diameter, count and start drawn from the priors.
-A film with drag or friction has the tray and the camera of the film without.
+A film with drag, friction or sticking has the tray and the camera of the film without.
 
 Films and results are kept (`filmed_cycles.folder`), results under a key of the source code: an
 interrupted run goes on where it was.
@@ -62,20 +62,23 @@ class DrawnFilm:
     drag : float, [1/s]
     friction : float
         Of beads, floor, lid and walls, with a tangential restitution of 0.4; 0 is smooth.
+    sticking : float, [m/s]
+        Beads stick below this normal speed, to bodies that turn; 0: never.
     """
 
     tray: int
     number: int
     drag: float = 0.0
     friction: float = 0.0
+    sticking: float = 0.0
 
     @property
     def stem(self) -> Path:
-        """The path of the film without its suffix; drag and friction in thousandths."""
+        """The path of the film without its suffix; what was added in thousandths."""
         physics = [
-            f'_{name}_{round(1e3 * value)}'
-            for name, value in (('drag', self.drag), ('friction', self.friction))
-            if value
+            f'_{name}_{round(1e3 * getattr(self, name))}'
+            for name in ('drag', 'friction', 'sticking')
+            if getattr(self, name)
         ]
         name = f'tray_{self.tray}_{self.number}{"".join(physics)}'
         return folder() / 'drawn_cameras' / name
@@ -143,6 +146,7 @@ def _draw(film: DrawnFilm) -> None:
         'seed': 5000 + film.number,
         'tray': film.tray,
         'drag': film.drag,
+        'sticking_speed': film.sticking,
         **rough.settings,
     }
     simulation = with_values(SimulationSettings(), values, 'benchmark')

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import cv2
 import numpy as np
@@ -16,8 +16,10 @@ from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.pipeline.composition import Pipeline, Wanted
 from nanorocks_ros.records import (
+    ClusterEstimate,
     CorEstimate,
     CorStatus,
+    Merge,
     Notice,
     PairCollision,
     Quality,
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.pipeline.composition import Result
     from nanorocks_ros.records import ArrayRecord
 
+_Kind = TypeVar('_Kind')
 DECADES = (0.1e-3, 0.3e-3, 1e-3, 3e-3, 10e-3)
 """Limits of the groups of true speeds, [m/s]."""
 _NS = 1e9
@@ -73,6 +76,9 @@ class FilmResult:
     errors : tuple of PlaceErrors or None
         Of each species: stated errors of places and radii over the true ones.
     collisions : tuple of PairCollision
+    clusters : tuple of ClusterEstimate
+        Last estimate of each cycle, and of the time before the first.
+    merges : tuple of Merge
     epoch_ns : int
         Stamp of the first frame.
     """
@@ -87,6 +93,8 @@ class FilmResult:
     radii: tuple[float, ...] = ()
     errors: tuple[PlaceErrors | None, ...] = ()
     collisions: tuple[PairCollision, ...] = ()
+    clusters: tuple[ClusterEstimate, ...] = ()
+    merges: tuple[Merge, ...] = ()
     epoch_ns: int = 0
 
     @property
@@ -97,13 +105,13 @@ class FilmResult:
         return self.cycles[0]
 
 
-# Flags that say nothing against a restitution.
-_HARMLESS = Quality.GRAY_CAMERA | Quality.GLARE | Quality.SATURATED
+HARMLESS = Quality.GRAY_CAMERA | Quality.GLARE | Quality.SATURATED
+"""Flags that say nothing against a restitution."""
 
 
 def is_flagged(estimate: CorEstimate) -> bool:
     """Whether a flag warns of the restitution."""
-    return bool(estimate.quality & ~_HARMLESS)
+    return bool(estimate.quality & ~HARMLESS)
 
 
 def measure(film: FilmTruth) -> FilmResult:
@@ -149,8 +157,8 @@ class _Reading:
                 continue
             self._keep(pipeline.follow(pipeline.preprocessor.push(frame), wanted), notices)
         self._keep(pipeline.flush(), notices)
-        speeds = [record for record in self._records if isinstance(record, SpeedEstimate)]
-        estimates = [record for record in self._records if isinstance(record, CorEstimate)]
+        speeds = self._of_kind(SpeedEstimate)
+        estimates = self._of_kind(CorEstimate)
         return FilmResult(
             notices=tuple(notices),
             cycles=tuple(last_of_each_cycle(estimates)),
@@ -160,9 +168,11 @@ class _Reading:
             counts=self._counts(),
             radii=self._radii(epoch_ns),
             errors=place_errors(self._film, self._tracks, epoch_ns),
-            collisions=tuple(
-                record for record in self._records if isinstance(record, PairCollision)
+            collisions=tuple(self._of_kind(PairCollision)),
+            clusters=tuple(
+                {record.cycle: record for record in self._of_kind(ClusterEstimate)}.values()
             ),
+            merges=tuple(self._of_kind(Merge)),
             epoch_ns=epoch_ns,
         )
 
@@ -174,6 +184,9 @@ class _Reading:
                 notices.append(record.text)
             elif is_measured(record):
                 self._records.append(record)
+
+    def _of_kind(self, kind: type[_Kind]) -> list[_Kind]:
+        return [record for record in self._records if isinstance(record, kind)]
 
     def _narrower(self) -> tuple[CorEstimate, ...]:
         """The estimates with intervals of 68 % from the same speeds and contacts."""
@@ -209,7 +222,7 @@ class _Reading:
     def _flagged(self, speeds: list[SpeedEstimate], epoch_ns: int) -> float:
         start_ns = epoch_ns + round(self._film.shake * _NS)
         later = [speed for speed in speeds if speed.stamp_ns > start_ns]
-        flagged = [speed for speed in later if speed.quality & ~_HARMLESS]
+        flagged = [speed for speed in later if speed.quality & ~HARMLESS]
         return len(flagged) / len(later) if later else 0.0
 
     def _counts(self) -> tuple[float, ...]:

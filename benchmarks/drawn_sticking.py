@@ -1,0 +1,149 @@
+"""Films of drawn cameras in which beads stick: restitutions, sticking speed and onset.
+
+Films of trays and cameras that are drawn (`drawn_films`), each with sticking speeds of 1, 3 and 10
+mm/s and without; bodies turn. ``NANOROCKS_FILM_COUNT`` is the number of films a row, 8 by default.
+"Unflagged" films have one cycle, and no flag but that beads stick; all columns behind are those of
+them. "Holds" is the share of 95 % intervals with the truth, those from 0 to 1 among them, and
+one-sided ones of the sticking speed. Onsets are first merges since the kick.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
+from benchmarks.film_measurement import HARMLESS
+from nanorocks_ros.records import CorStatus, Quality, StickingStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from nanorocks_ros.records import ClusterEstimate
+
+_TRAYS = (1, 3)
+_STICKING = (0.0, 1e-3, 3e-3, 10e-3)
+_FILMS = 8
+# Within which a sticking speed counts as right.
+_FACTOR = 1.3
+_HEADER = (
+    '\n| tray, sticking speed | films | unflagged | final | walls known | hold | half-width '
+    '| median error | beads known | hold | half-width | median error | merges found, true '
+    '| first merge found later by: mean (largest) [s], in | sticking speed / truth: mean (sd) of '
+    f'those measured, within a factor of {_FACTOR} | hold | upper limits below the truth |\n'
+    + '| --- ' * 17
+    + '|'
+)
+
+
+def report() -> None:
+    """Make missing films, measure in all, and print the table."""
+    films = {
+        (tray, sticking): [
+            DrawnFilm(tray=tray, number=number, sticking=sticking)
+            for number in range(film_count(_FILMS))
+        ]
+        for sticking in _STICKING
+        for tray in _TRAYS
+    }
+    draw([film for same in zip(*films.values(), strict=True) for film in same])
+    print(_HEADER)
+    for tray in _TRAYS:
+        for sticking in _STICKING:
+            videos = [film.video for film in films[tray, sticking]]
+            read = measured([video for video in videos if video])
+            name = f'{tray}, {1e3 * sticking:g} mm/s' if sticking else f'{tray}, never'
+            print(f'| {name} | {_cells(read)} |', flush=True)
+
+
+def _cells(read: Sequence[ReadFilm]) -> str:
+    """All cells but that of the case."""
+    unflagged = [film for film in read if _is_unflagged(film)]
+    final = sum(film.result.cycles[0].status is CorStatus.FINAL for film in unflagged)
+    return ' | '.join(
+        (
+            f'{len(read)}',
+            f'{len(unflagged)}',
+            f'{final}',
+            *_restitution_cells(unflagged, 'wall_restitution', 'walls'),
+            *_restitution_cells(unflagged, 'restitution', 'beads'),
+            *_merge_cells(unflagged),
+            *_speed_cells(unflagged),
+        )
+    )
+
+
+def _is_unflagged(film: ReadFilm) -> bool:
+    cycles = film.result.cycles
+    return len(cycles) == 1 and not cycles[0].quality & ~(HARMLESS | Quality.STICKING)
+
+
+def _restitution_cells(
+    read: Sequence[ReadFilm], name: str, truth: str
+) -> tuple[str, str, str, str]:
+    """Values, share of the intervals that hold, median half-width, median error."""
+    rows = []
+    for film in read:
+        interval, true = getattr(film.result.cycles[0], name), getattr(film.film, truth)
+        limits = np.array([interval.value, interval.lower, interval.upper]) - true
+        rows.append(limits)
+    value, lower, upper = np.array(rows).reshape(-1, 3).T
+    limited, known = np.isfinite(upper), np.isfinite(value)
+    holds = np.mean((lower <= 0.0) & (upper >= 0.0), where=limited) if limited.any() else math.nan
+    if not known.any():
+        return '0', f'{holds:.2f}', '', ''
+    half_width, error = np.median([0.5 * (upper - lower)[known], value[known]], axis=1)
+    return f'{known.sum()}', f'{holds:.2f}', f'{half_width:.4f}', f'{error:+.4f}'
+
+
+def _merge_cells(read: Sequence[ReadFilm]) -> tuple[str, str]:
+    """Merges that make bodies fewer, and how late the first is found."""
+    found = sum(merge.joins for film in read for merge in film.result.merges)
+    true = sum(film.film.merges.size for film in read)
+    late = np.array(
+        [
+            film.result.clusters[-1].onset - film.film.merges.min()
+            for film in read
+            if film.film.merges.size
+        ]
+    )
+    seen = late[np.isfinite(late)]
+    if not seen.size:
+        return f'{found}, {true}', f'0/{late.size}' if late.size else ''
+    return (
+        f'{found}, {true}',
+        f'{seen.mean():+.2f} ({np.abs(seen).max():.2f}), {seen.size}/{late.size}',
+    )
+
+
+def _speed_cells(read: Sequence[ReadFilm]) -> tuple[str, str, str]:
+    """Sticking speeds over the truth, share of the intervals that hold, upper limits too low."""
+    found = [(film.result.clusters[-1], film.film.sticking) for film in read]
+    known = [
+        (cluster, true)
+        for cluster, true in found
+        if cluster.sticking_status is not StickingStatus.UNKNOWN
+    ]
+    if not known:
+        return '', '', ''
+    low = sum(cluster.sticking_speed.upper < true for cluster, true in known)
+    holds = np.mean([_holds(cluster, true) for cluster, true in known])
+    ratios = [
+        cluster.sticking_speed.value / true
+        for cluster, true in known
+        if true and math.isfinite(cluster.sticking_speed.value)
+    ]
+    if not ratios:
+        return '', f'{holds:.2f}', f'{low}'
+    within = np.mean(np.abs(np.log(ratios)) < math.log(_FACTOR))
+    return (
+        f'{np.mean(ratios):.2f} ({np.std(ratios):.2f}) of {len(ratios)}, {within:.0%}',
+        f'{holds:.2f}',
+        f'{low}',
+    )
+
+
+def _holds(cluster: ClusterEstimate, true: float) -> bool:
+    return cluster.sticking_speed.lower <= true <= cluster.sticking_speed.upper
