@@ -18,13 +18,14 @@ from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measur
 from nanorocks_ros.records import Interval
 
 _TRAYS = (1, 3)
-# Drag and friction of each row; the first is the ideal one.
-_ROWS = (
+ROWS = (
     (0.0, 0.0),
     *((drag, 0.0) for drag in (0.005, 0.02, 0.07)),
     *((0.0, friction) for friction in (0.01, 0.03, 0.1)),
     *((0.02, friction) for friction in (0.01, 0.03)),
 )
+"""Drag and friction of each row; the first is the ideal one."""
+
 _FILMS = 40
 _NAMES = ('restitution', 'wall_restitution')
 
@@ -36,7 +37,7 @@ def report() -> None:
             DrawnFilm(tray=tray, number=number, drag=row[0], friction=row[1])
             for number in range(film_count(_FILMS))
         ]
-        for row in _ROWS
+        for row in ROWS
         for tray in _TRAYS
     }
     draw([film for same in zip(*films.values(), strict=True) for film in same])
@@ -47,7 +48,7 @@ def report() -> None:
     )
     for tray in _TRAYS:
         ideal: list[ReadFilm] = []
-        for drag, friction in _ROWS:
+        for drag, friction in ROWS:
             videos = [film.video for film in films[tray, drag, friction]]
             read = measured([video for video in videos if video])
             ideal = ideal or read

@@ -7,7 +7,7 @@ contradict it, or show that walls rub, only the contacts are believed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_terms import NO_SLOWING
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
-from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.inference.speed_dependence import SpeedDependence
 from nanorocks_ros.records import (
@@ -39,9 +38,6 @@ if TYPE_CHECKING:
 NO_DEPENDENCE = SpeedDependence()
 """Of restitutions that are not compared at different speeds."""
 
-# Where contacts are believed alone walls rub: the prior of their friction, whose error is that of
-# walls that hardly do, is wider by this. By default 0.03 is then half as likely as 0.
-_WIDER = 10.0
 # Of its loss by which a restitution reads high, and by how much that may differ, where decay and
 # contacts of a gas that depends on speed are read as those of a constant one: 0.11 to 0.13 at an
 # exponent of 0.2, 0.24 to 0.25 at 0.6 (`python -m benchmarks speed_headlines`).
@@ -165,8 +161,9 @@ def restitution_sources(
     decay_counts : bool
         False where the log likelihood holds no decay that can be trusted.
     losses : FlightLosses, optional
-        What slows beads between contacts, where flights were seen. By friction only where contacts
-        are believed alone: that widens their intervals.
+        What slows beads between contacts, where flights were seen. Walls are always read with the
+        friction of floor and lid that rebounds and flights tell; beads only where contacts are
+        believed alone: that widens their intervals.
     dependence : SpeedDependence, optional
         Of the contacts; the decay does not count where it is seen.
 
@@ -178,7 +175,7 @@ def restitution_sources(
     walls = prior.min_wall_restitution, prior.max_wall_restitution
     slowing = losses.slowing if losses else NO_SLOWING
     bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-    wall_likelihood = contacts.wall_likelihood(prior.rebound_bias, slowing)
+    wall_likelihood = _wall_likelihood(contacts, prior, losses)
     joint = posterior_of(
         tables,
         log_likelihood,
@@ -196,7 +193,6 @@ def restitution_sources(
         slowing = losses.rubbed if losses else NO_SLOWING
         drag = slowing.drag if losses else UNKNOWN_MEASURED
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-        wall_likelihood = _with_friction(contacts, prior, slowing)
     return RestitutionSources(
         joint=joint,
         decay=posterior_of(tables, log_likelihood, walls) if number else joint,
@@ -209,17 +205,19 @@ def restitution_sources(
     )
 
 
-def _with_friction(
-    contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
+def _wall_likelihood(
+    contacts: ContactTerms, prior: PriorSettings, losses: FlightLosses | None
 ) -> Likelihood1D | None:
-    """Log likelihood of the wall restitution where floor and lid rub as the walls do."""
-    wide = replace(prior, friction_error=_WIDER * prior.friction_error)
-    weights = friction_weights(wide, contacts)
+    """Log likelihood of the wall restitution where floor and lid may rub as the walls do."""
+    weights = friction_weights(prior, contacts)
     if weights is None:
         # Only where no bead rebounds by itself.
+        slowing = losses.slowing if losses else NO_SLOWING
         return contacts.wall_likelihood(prior.rebound_bias, slowing)
     return contacts.rubbed_wall_likelihood(
-        prior.rebound_bias, slowing.drag, (weights.friction, weights.weight)
+        prior.rebound_bias,
+        losses.fitted if losses else NO_SLOWING,
+        (weights.friction, weights.weight),
     )
 
 

@@ -150,7 +150,7 @@ class ContactTerms:
     def rubbed_wall_likelihood(
         self,
         bias: float,
-        drag: Measured,
+        slowing: Slowing,
         friction: tuple[NDArray[np.float64], NDArray[np.float64]],
     ) -> Likelihood1D | None:
         """Log likelihood of the wall restitution where floor and lid may rub.
@@ -159,14 +159,14 @@ class ContactTerms:
         ----------
         bias : float
             As of `wall_likelihood`.
-        drag : Measured, [1/s]
-            Of the gas.
+        slowing : Slowing
+            Drag and friction rate as flights tell them.
         friction : tuple of 2 ndarrays (n,)
             Frictions of floor and lid, and their probabilities.
         """
         if not self.rebounds:
             return None
-        return rubbed_likelihood(self.rebound_impacts, drag, friction).convolved(bias)
+        return rubbed_likelihood(self.rebound_impacts, slowing, friction).convolved(bias)
 
     def bead_likelihood(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING
