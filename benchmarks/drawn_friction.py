@@ -43,15 +43,25 @@ _CYCLES = {1: 80, 3: 24}
 _SECONDS, _FIRST, _EVERY, _ERROR = 25.0, 1.75, 0.1, 0.02
 _RATES, _JITTERS = (15.0, 24.0, 30.0, 60.0), (0.05, 0.1, 0.2)
 _ENDS = np.array([0.025, 0.5, 0.975])
-_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of what a hit takes off a bead that slides."""
 _WALLS = np.linspace(0.5, 1.0, 251)
 _FEWEST = 5
 _PRIOR = PriorSettings()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Cycle:
-    """Errors of both intervals, of the walls by shares, and whether contacts are believed."""
+class DrawnCycle:
+    """What one cycle tells.
+
+    Parameters
+    ----------
+    beads, walls : Interval
+        Headlines less the truth.
+    from_contacts : bool
+    pulls : tuple of float
+        Error of the walls over the stated one for each of `SHARES`, with friction and drag known.
+    """
 
     beads: Interval
     walls: Interval
@@ -68,7 +78,9 @@ def report() -> None:
     }
     tasks = {str(task): task for same in cases.values() for task in same}
     with Progress('true tracks') as progress:
-        cycles = dict(zip(tasks, run_tasks(_cycle, tasks, Workers(), progress.count), strict=True))
+        cycles = dict(
+            zip(tasks, run_tasks(_cycle_of, tasks, Workers(), progress.count), strict=True)
+        )
     by_case = {case: [cycles[str(task)] for task in same] for case, same in cases.items()}
     print(
         '\n| tray | drag [1/s] | friction | cycles | from contacts | beads: holds | half-width | '
@@ -82,9 +94,7 @@ def report() -> None:
             cells.append(f'{seen.holds:.2f} | {seen.half_width:.4f} | {seen.median_error:+.4f}')
         print(f'| {" | ".join(cells)} |')
     print('\n| tray | drag [1/s] | friction |', end='')
-    print(
-        ''.join(f' {share:g} |' for share in _SHARES) + '\n' + '| --- ' * (3 + len(_SHARES)) + '|'
-    )
+    print(''.join(f' {share:g} |' for share in SHARES) + '\n' + '| --- ' * (3 + len(SHARES)) + '|')
     for (number, drag, friction), read in by_case.items():
         if friction:
             pulls = np.nanmean([cycle.pulls for cycle in read], axis=0)
@@ -92,8 +102,18 @@ def report() -> None:
             print(f'| {number} | {drag:g} | {friction:g} | {cells} |')
 
 
-def _cycle(task: tuple[int, int, float, float]) -> _Cycle:
-    number, run, drag, friction = task
+def _cycle_of(task: tuple[int, int, float, float]) -> DrawnCycle:
+    return drawn_cycle(*task)
+
+
+def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCycle:
+    """A drawn gas and what its true tracks tell.
+
+    Parameters
+    ----------
+    number, run, drag, friction
+        As of `drawn_gas`.
+    """
     tray, values = drawn_gas(number, run, drag, friction)
     rate, jitter = _RATES[run % len(_RATES)], _JITTERS[run % len(_JITTERS)] / METRE_PX
     values |= {'first_shake': 0.0, 'seed': 9000 + run, 'frame_rate': rate}
@@ -133,7 +153,7 @@ def _cycle(task: tuple[int, int, float, float]) -> _Cycle:
             sources.intervals(_ENDS), ('restitution', 'wall_restitution'), strict=True
         )
     ]
-    return _Cycle(
+    return DrawnCycle(
         beads=errors[0],
         walls=errors[1],
         from_contacts=sources.headline is Headline.CONTACTS,
@@ -144,10 +164,10 @@ def _cycle(task: tuple[int, int, float, float]) -> _Cycle:
 def _pulls(terms: ContactTerms, known: tuple[float, float], truth: float) -> tuple[float, ...]:
     """Error of the walls over the stated one, by shares of what hits take off."""
     if terms.rebounds < _FEWEST:
-        return (math.nan,) * len(_SHARES)
+        return (math.nan,) * len(SHARES)
     drag, friction = known
     pulls = []
-    for share in _SHARES:
+    for share in SHARES:
         hits, drags = np.array([share * friction]), np.array([drag])
         table = rubbed_table(terms.rebound_impacts, _WALLS, hits, drags)
         logs = marginal(table.reshape(-1, _WALLS.size))

@@ -2,9 +2,9 @@
 
 Films of trays and cameras that are drawn (`drawn_films`), each with and without drag and friction;
 ``NANOROCKS_FILM_COUNT`` is the number of films a row, 40 by default. The intervals are those of
-all final headlines of beads, and of walls, whether or not a flag warns of them; "unflagged" is the
-share without. "Over ideal" is the median over films of the half-width over that of the same film
-without drag and friction.
+all final headlines of beads, and of walls: how many hold the truth of all, and of those that no
+flag warns of; "unflagged" is the share of these. "Over ideal" is the median over films of the
+half-width over that of the same film without drag and friction.
 """
 
 from __future__ import annotations
@@ -43,8 +43,10 @@ def report() -> None:
     draw([film for same in zip(*films.values(), strict=True) for film in same])
     print(
         '\n| tray | drag [1/s] | friction | drag found - true, sd of a film | final | unflagged | '
-        'beads: holds | half-width | over ideal | median error | walls: holds | half-width | '
-        'over ideal | median error |\n' + '| --- ' * 14 + '|'
+        'beads: holds, unflagged | half-width | over ideal | median error | '
+        'walls: holds, unflagged | half-width | over ideal | median error |\n'
+        + '| --- ' * 14
+        + '|'
     )
     for tray in _TRAYS:
         ideal: list[ReadFilm] = []
@@ -73,7 +75,9 @@ def _cells(read: list[ReadFilm], ideal: list[ReadFilm], drag: float) -> str:
             _half_width(film, name) / _half_width(same, name)
             for film, same in zip(read, ideal, strict=True)
         ]
-        cells += [f'{seen.holds:.2f}', f'{seen.half_width:.4f}', f'{np.nanmedian(ratios):.2f}']
+        unflagged = [error for error, film in zip(errors, read, strict=True) if film.is_unflagged]
+        holds = f'{seen.holds:.2f}, {coverage(unflagged, 0.0).holds:.2f}'
+        cells += [holds, f'{seen.half_width:.4f}', f'{np.nanmedian(ratios):.2f}']
         cells.append(f'{seen.median_error:+.4f}')
     return ' | '.join(cells)
 
