@@ -51,7 +51,9 @@ _CHANGE = 1.95
 # Share of that which hits take off: beads that roll lose less, and a hit that shows ends a flight.
 # With friction and drag known walls came out right with 0.3 to 0.45 (frictions of 0.01 to 0.1,
 # `benchmarks.drawn_friction`); and its relative spread in the friction rate of the flights.
-_SHARE, _SHARE_SPREAD = 0.4, 0.5
+ROLLING, SLIDING = 0.4, 1.0
+"""Shares of the full loss that hits take off a bead."""
+_SHARE_SPREAD = 0.5
 # Vertical speeds, in steps of a part of their root mean square, and equally likely times of a hit.
 _SPEEDS, _STEP, _PHASES = 10, 0.3, 6
 _GOLDEN = 0.618034
@@ -77,6 +79,7 @@ def rubbed_likelihood(
     impacts: NDArray[np.float64],
     slowing: Slowing,
     friction: tuple[NDArray[np.float64], NDArray[np.float64]],
+    share: float = ROLLING,
 ) -> Likelihood1D:
     """Log likelihood of rebounds, with friction, drag and the scale of errors integrated over.
 
@@ -88,22 +91,25 @@ def rubbed_likelihood(
         Drag and friction rate as flights tell them; a gas slows beads, whatever they tell.
     friction : tuple of 2 ndarrays (n,)
         Frictions of floor and lid, and their probabilities.
+    share : float
+        Of the full loss that hits take off.
     """
     places = np.interp(friction[0], _FRICTIONS, np.arange(_FRICTIONS.size))
     below = np.minimum(places.astype(int), _FRICTIONS.size - 2)
     weights = np.bincount(below, friction[1] * (1.0 + below - places), _FRICTIONS.size)
     weights += np.bincount(below + 1, friction[1] * (places - below), _FRICTIONS.size)
-    rates = _SHARE * _CHANGE * _FRICTIONS / _free_height(impacts)
+    rates = share * _CHANGE * _FRICTIONS / _free_height(impacts)
     beside = [slowing.beside_friction(rate, _SHARE_SPREAD * rate) for rate in rates.tolist()]
     logs = np.array([log_likelihood for _, log_likelihood in beside])
     weights = weights * np.exp(logs - logs.max())
+    weights /= weights.sum()
     drag_time = float(np.mean(impacts[:, DRAG_TIME]))
     by_friction, likely = [], np.flatnonzero(weights > _UNLIKELY * weights.max())
     for k in likely.tolist():
         drag = beside[k][0]
         errors = _FEW_DRAGS if drag.error * drag_time < _FAINT else _MANY_DRAGS
         drags = np.maximum(drag.value + drag.error * errors, 0.0)
-        table = rubbed_table(impacts, _WALLS, _SHARE * _FRICTIONS[k : k + 1], drags)
+        table = rubbed_table(impacts, _WALLS, share * _FRICTIONS[k : k + 1], drags)
         by_friction.append(marginal(table.reshape(-1, _WALLS.size)))
     logs = log_sum(np.array(by_friction), weights[likely])
     return Likelihood1D(restitution=_WALLS, log_likelihood=logs)
