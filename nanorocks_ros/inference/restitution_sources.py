@@ -245,6 +245,8 @@ def _rubbed(
         (weights.friction, weights.weight),
         SLIDING,
     )
+    if sliding is None:
+        return rolling
     both = np.array([rolling.log_likelihood, sliding.log_likelihood])
     return replace(rolling, log_likelihood=log_sum(both))
 
