@@ -13,7 +13,7 @@ from nanorocks_ros.inference.contacts.contact_likelihood import rebound_log_like
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
 from nanorocks_ros.inference.contacts.impact_tables import rebound_impacts
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
+from nanorocks_ros.inference.contacts.rubbed_rebounds import SLIDING, rubbed_likelihood
 from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import Measured
@@ -72,7 +72,8 @@ def _rebounds(seed, n, friction):
 
 
 def _quantiles(rebounds, friction, drag=NO_DRAG):
-    likelihood = rubbed_likelihood(rebound_impacts(list(rebounds)), drag, friction)
+    # These beads do not spin.
+    likelihood = rubbed_likelihood(rebound_impacts(list(rebounds)), drag, friction, SLIDING)
     return likelihood.posterior((0.5, 1.0)).quantiles(ENDS)
 
 
