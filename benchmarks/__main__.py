@@ -68,6 +68,7 @@ ALL = (
     'decay_libraries',
     'friction',
     'friction_films',
+    'drawn_friction',
     'drag',
     'speed_dependence',
     'speed_headlines',

@@ -36,6 +36,8 @@ from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from nanorocks_ros.experiment.trays import Tray
+
 COUNT = 'NANOROCKS_FILM_COUNT'
 """Environment variable with the number of drawn films of each tray."""
 
@@ -130,24 +132,45 @@ def measured(videos: Sequence[Path]) -> list[ReadFilm]:
     ]
 
 
-def _draw(film: DrawnFilm) -> None:
-    """Draw the truth of a tray, and film it with a drawn camera."""
+def drawn_gas(
+    number: int, run: int, drag: float, friction: float
+) -> tuple[Tray, dict[str, float | str]]:
+    """A tray and the settings of its gas, drawn from the priors.
+
+    Parameters
+    ----------
+    number : int
+        Of the tray.
+    run : int
+        What is drawn depends on these two alone.
+    drag : float, [1/s]
+    friction : float
+        As of `DrawnFilm`.
+    """
     prior = PriorSettings()
-    random = np.random.default_rng([film.number, film.tray])
+    random = np.random.default_rng([run, number])
     beads = random.uniform(*_BEADS)
     walls = random.uniform(prior.min_wall_restitution, prior.max_wall_restitution)
-    tray, values = varied(load_trays()[film.tray], walls, prior, random)
-    rough = Roughness(tangential=_TANGENTIAL, friction=film.friction) if film.friction else SMOOTH
+    tray, values = varied(load_trays()[number], walls, prior, random)
+    rough = Roughness(tangential=_TANGENTIAL, friction=friction) if friction else SMOOTH
     values |= {
         'restitution': beads,
         'wall_restitution': walls,
         'mean_speed': math.exp(random.uniform(*np.log(_SPEEDS))),
+        'tray': number,
+        'drag': drag,
+        **rough.settings,
+    }
+    return tray, values
+
+
+def _draw(film: DrawnFilm) -> None:
+    """Draw the truth of a tray, and film it with a drawn camera."""
+    tray, values = drawn_gas(film.tray, film.number, film.drag, film.friction)
+    values |= {
         'first_shake': _SHAKE,
         'seed': 5000 + film.number,
-        'tray': film.tray,
-        'drag': film.drag,
         'sticking_speed': film.sticking,
-        **rough.settings,
     }
     simulation = with_values(SimulationSettings(), values, 'benchmark')
     film.stem.parent.mkdir(parents=True, exist_ok=True)

@@ -2,9 +2,9 @@
 
 Films of trays and cameras that are drawn (`drawn_films`), each with and without drag and friction;
 ``NANOROCKS_FILM_COUNT`` is the number of films a row, 40 by default. The intervals are those of
-all final headlines of beads, and of walls, whether or not a flag warns of them; "unflagged" is the
-share without. "Over ideal" is the median over films of the half-width over that of the same film
-without drag and friction.
+all final headlines of beads, and of walls: how many hold the truth of all, and of those that no
+flag warns of; "unflagged" is the share of these. "Over ideal" is the median over films of the
+half-width over that of the same film without drag and friction.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measur
 from nanorocks_ros.records import Interval
 
 _TRAYS = (1, 3)
-# Drag and friction of each row; the first is the ideal one.
-_ROWS = (
+ROWS = (
     (0.0, 0.0),
     *((drag, 0.0) for drag in (0.005, 0.02, 0.07)),
     *((0.0, friction) for friction in (0.01, 0.03, 0.1)),
     *((0.02, friction) for friction in (0.01, 0.03)),
 )
+"""Drag and friction of each row; the first is the ideal one."""
+
 _FILMS = 40
 _NAMES = ('restitution', 'wall_restitution')
 
@@ -36,18 +37,20 @@ def report() -> None:
             DrawnFilm(tray=tray, number=number, drag=row[0], friction=row[1])
             for number in range(film_count(_FILMS))
         ]
-        for row in _ROWS
+        for row in ROWS
         for tray in _TRAYS
     }
     draw([film for same in zip(*films.values(), strict=True) for film in same])
     print(
         '\n| tray | drag [1/s] | friction | drag found - true, sd of a film | final | unflagged | '
-        'beads: holds | half-width | over ideal | median error | walls: holds | half-width | '
-        'over ideal | median error |\n' + '| --- ' * 14 + '|'
+        'beads: holds, unflagged | half-width | over ideal | median error | '
+        'walls: holds, unflagged | half-width | over ideal | median error |\n'
+        + '| --- ' * 14
+        + '|'
     )
     for tray in _TRAYS:
         ideal: list[ReadFilm] = []
-        for drag, friction in _ROWS:
+        for drag, friction in ROWS:
             videos = [film.video for film in films[tray, drag, friction]]
             read = measured([video for video in videos if video])
             ideal = ideal or read
@@ -72,7 +75,9 @@ def _cells(read: list[ReadFilm], ideal: list[ReadFilm], drag: float) -> str:
             _half_width(film, name) / _half_width(same, name)
             for film, same in zip(read, ideal, strict=True)
         ]
-        cells += [f'{seen.holds:.2f}', f'{seen.half_width:.4f}', f'{np.nanmedian(ratios):.2f}']
+        unflagged = [error for error, film in zip(errors, read, strict=True) if film.is_unflagged]
+        holds = f'{seen.holds:.2f}, {coverage(unflagged, 0.0).holds:.2f}'
+        cells += [holds, f'{seen.half_width:.4f}', f'{np.nanmedian(ratios):.2f}']
         cells.append(f'{seen.median_error:+.4f}')
     return ' | '.join(cells)
 

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_terms import NO_SLOWING
+from nanorocks_ros.inference.contacts.rubbed_rebounds import SLIDING
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
 from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.inference.speed_dependence import SpeedDependence
+from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.records import (
     UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
@@ -165,8 +167,9 @@ def restitution_sources(
     decay_counts : bool
         False where the log likelihood holds no decay that can be trusted.
     losses : FlightLosses, optional
-        What slows beads between contacts, where flights were seen. By friction only where contacts
-        are believed alone: that widens their intervals.
+        What slows beads between contacts, where flights were seen. Walls are always read with the
+        friction of floor and lid that rebounds and flights tell; beads only where contacts are
+        believed alone: that widens their intervals.
     dependence : SpeedDependence, optional
         Of the contacts; the decay does not count where it is seen.
 
@@ -178,7 +181,7 @@ def restitution_sources(
     walls = prior.min_wall_restitution, prior.max_wall_restitution
     slowing = losses.slowing if losses else NO_SLOWING
     bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-    wall_likelihood = contacts.wall_likelihood(prior.rebound_bias, slowing)
+    wall_likelihood = _wall_likelihood(contacts, prior, losses)
     joint = posterior_of(
         tables,
         log_likelihood,
@@ -196,7 +199,7 @@ def restitution_sources(
         slowing = losses.rubbed if losses else NO_SLOWING
         drag = slowing.drag if losses else UNKNOWN_MEASURED
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-        wall_likelihood = _with_friction(contacts, prior, slowing)
+        wall_likelihood = _rubbed(wall_likelihood, contacts, prior, slowing)
     return RestitutionSources(
         joint=joint,
         decay=posterior_of(tables, log_likelihood, walls) if number else joint,
@@ -209,18 +212,43 @@ def restitution_sources(
     )
 
 
-def _with_friction(
-    contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
+def _wall_likelihood(
+    contacts: ContactTerms, prior: PriorSettings, losses: FlightLosses | None
 ) -> Likelihood1D | None:
-    """Log likelihood of the wall restitution where floor and lid rub as the walls do."""
-    wide = replace(prior, friction_error=_WIDER * prior.friction_error)
-    weights = friction_weights(wide, contacts)
+    """Log likelihood of the wall restitution where floor and lid may rub as the walls do."""
+    weights = friction_weights(prior, contacts)
     if weights is None:
         # Only where no bead rebounds by itself.
+        slowing = losses.slowing if losses else NO_SLOWING
         return contacts.wall_likelihood(prior.rebound_bias, slowing)
     return contacts.rubbed_wall_likelihood(
-        prior.rebound_bias, slowing.drag, (weights.friction, weights.weight)
+        prior.rebound_bias,
+        losses.fitted if losses else NO_SLOWING,
+        (weights.friction, weights.weight),
     )
+
+
+def _rubbed(
+    rolling: Likelihood1D | None, contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
+) -> Likelihood1D | None:
+    """Log likelihood of the walls where beads may as well slide at each hit, equally likely.
+
+    Sliding beads take more hits that show, so that flights do not tell their friction.
+    """
+    wide = replace(prior, friction_error=_WIDER * prior.friction_error)
+    weights = friction_weights(wide, contacts)
+    if weights is None or rolling is None:
+        return rolling
+    sliding = contacts.rubbed_wall_likelihood(
+        prior.rebound_bias,
+        Slowing.by_drag(slowing.drag),
+        (weights.friction, weights.weight),
+        SLIDING,
+    )
+    if sliding is None:
+        return rolling
+    both = np.array([rolling.log_likelihood, sliding.log_likelihood])
+    return replace(rolling, log_likelihood=log_sum(both))
 
 
 def intervals_of(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:

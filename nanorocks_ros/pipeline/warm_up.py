@@ -9,9 +9,7 @@ import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.experiment.view import IdentityLens, View
-from nanorocks_ros.inference.contacts.impact_tables import rebound_impacts
 from nanorocks_ros.inference.contacts.restitution_exponent import MIN_CONTACTS
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.numerics.picture_jitter import JitterMeter
@@ -117,10 +115,6 @@ def warm_up_cooling() -> None:
             )
         )
     fitter.flush()
-    # Asked only where contacts contradict the decay.
-    impacts = rebound_impacts([_rebound(_TENTH_NS, 0.005)])
-    frictions, weights = np.array([0.0, 0.01]), np.array([0.5, 0.5])
-    rubbed_likelihood(impacts, Measured(0.0, 0.1), (frictions, weights))
 
 
 def _rebound(stamp_ns: int, speed: float) -> Rebound:

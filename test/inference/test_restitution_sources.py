@@ -77,13 +77,15 @@ def test_a_drag_below_0_by_chance_does_not_lower_the_walls(tables):
             acceleration=unknown,
             covariance=np.full((2, 2), np.nan),
             rubbed=Slowing.by_drag(Measured(0.0, 0.002)),
+            fitted=Slowing.by_drag(Measured(drag, 0.002)),
         )
         sources = restitution_sources(
             tables, decay(tables, 0.89, 0.97), contacts, PRIOR, losses=losses
         )
         assert sources.drag.value == drag
         walls.append(sources.intervals(ENDS)[1].value)
-    assert walls[0] == pytest.approx(walls[1], abs=1e-9)
+    # Taken as measured it would do so by 0.01 /s for 0.6 s.
+    assert walls[0] == pytest.approx(walls[1], abs=0.1 * 0.01 * 0.6)
 
 
 def test_where_they_do_not_only_the_contacts_count(tables):

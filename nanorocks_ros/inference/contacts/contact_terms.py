@@ -20,7 +20,7 @@ from nanorocks_ros.inference.contacts.impact_bins import speed_bins
 from nanorocks_ros.inference.contacts.impact_likelihoods import CollisionImpacts, ReboundImpacts
 from nanorocks_ros.inference.contacts.impact_tables import collision_impacts, rebound_impacts
 from nanorocks_ros.inference.contacts.restitution_exponent import bead_exponent, wall_exponent
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
+from nanorocks_ros.inference.contacts.rubbed_rebounds import ROLLING, rubbed_likelihood
 from nanorocks_ros.inference.contacts.wall_friction import (
     friction_likelihood,
     friction_table,
@@ -150,8 +150,9 @@ class ContactTerms:
     def rubbed_wall_likelihood(
         self,
         bias: float,
-        drag: Measured,
+        slowing: Slowing,
         friction: tuple[NDArray[np.float64], NDArray[np.float64]],
+        share: float = ROLLING,
     ) -> Likelihood1D | None:
         """Log likelihood of the wall restitution where floor and lid may rub.
 
@@ -159,14 +160,16 @@ class ContactTerms:
         ----------
         bias : float
             As of `wall_likelihood`.
-        drag : Measured, [1/s]
-            Of the gas.
+        slowing : Slowing
+            Drag and friction rate as flights tell them.
         friction : tuple of 2 ndarrays (n,)
             Frictions of floor and lid, and their probabilities.
+        share : float
+            Of the full loss that hits take off.
         """
         if not self.rebounds:
             return None
-        return rubbed_likelihood(self.rebound_impacts, drag, friction).convolved(bias)
+        return rubbed_likelihood(self.rebound_impacts, slowing, friction, share).convolved(bias)
 
     def bead_likelihood(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING

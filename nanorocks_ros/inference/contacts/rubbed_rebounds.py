@@ -5,6 +5,9 @@ friction times the change of the vertical speed off the speed along them, so tha
 nothing, or one or more such steps: the scatter of rebounds is one-sided. Vertical speeds are taken
 to be Gaussian, with the mean square of a horizontal component; the time of a hit is uniform.
 
+Friction and drag slow the flights together: a friction that is tried leaves the drag that the
+flights then tell, so that no loss counts twice.
+
 Tested by ``test/inference/contacts/test_rubbed_rebounds.py``.
 """
 
@@ -14,12 +17,15 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import ndtri
 
 from nanorocks_ros.inference.contacts.contact_likelihood import ERROR_SCALES, OUTLIERS, marginal
 from nanorocks_ros.inference.contacts.impact_tables import (
     DRAG,
+    DRAG_TIME,
     DRAG_TIME_AFTER,
     DRAG_TIME_BEFORE,
+    FRICTION_LENGTH,
     HITS_AFTER,
     HITS_BEFORE,
     INCOMING,
@@ -38,10 +44,16 @@ from nanorocks_ros.numerics.log_sums import log_sum
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nanorocks_ros.records import Measured
+    from nanorocks_ros.inference.flights.flight_losses import Slowing
 
 # Change of the vertical speed at a hit over the speed before it: 1 and a restitution.
 _CHANGE = 1.95
+# Share of that which hits take off: beads that roll lose less, and a hit that shows ends a flight.
+# With friction and drag known walls came out right with 0.3 to 0.45 (frictions of 0.01 to 0.1,
+# `benchmarks.drawn_friction`); and its relative spread in the friction rate of the flights.
+ROLLING, SLIDING = 0.4, 1.0
+"""Shares of the full loss that hits take off a bead."""
+_SHARE_SPREAD = 0.5
 # Vertical speeds, in steps of a part of their root mean square, and equally likely times of a hit.
 _SPEEDS, _STEP, _PHASES = 10, 0.3, 6
 _GOLDEN = 0.618034
@@ -50,8 +62,12 @@ _ALIKE, _LEAST = 0.25, 0.01
 # Restitutions of a likelihood, and frictions between which it is interpolated.
 _WALLS = np.linspace(0.5, 1.0, 251)
 _FRICTIONS = np.array([0.0, 0.004, 0.008, 0.015, 0.025, 0.04, 0.065, 0.1, 0.15])
-# Errors of equally likely drags from their mean.
-_DRAGS = math.sqrt(1.5) * np.array([-1.0, 0.0, 1.0])
+# Errors of equally likely drags from their mean, of unit variance: few, and many for drags whose
+# error times the drag time of rebounds is above this.
+_FEW_DRAGS = math.sqrt(1.5) * np.array([-1.0, 0.0, 1.0])
+_MANY_DRAGS = ndtri((np.arange(9) + 0.5) / 9.0)
+_MANY_DRAGS /= _MANY_DRAGS.std()
+_FAINT = 0.01
 # Frictions less probable than this, over the largest probability, are left out.
 _UNLIKELY = 1e-6
 # Errors beyond which a Gaussian is 0.
@@ -61,8 +77,9 @@ _SQRT_2_PI = math.sqrt(2.0 * math.pi)
 
 def rubbed_likelihood(
     impacts: NDArray[np.float64],
-    drag: Measured,
+    slowing: Slowing,
     friction: tuple[NDArray[np.float64], NDArray[np.float64]],
+    share: float = ROLLING,
 ) -> Likelihood1D:
     """Log likelihood of rebounds, with friction, drag and the scale of errors integrated over.
 
@@ -70,23 +87,44 @@ def rubbed_likelihood(
     ----------
     impacts : ndarray (n, REBOUND_COLUMNS)
         From `rebound_impacts`.
-    drag : Measured, [1/s]
-        Of the gas, for the first species; where it is not below 0 its true value is not, either.
+    slowing : Slowing
+        Drag and friction rate as flights tell them; a gas slows beads, whatever they tell.
     friction : tuple of 2 ndarrays (n,)
         Frictions of floor and lid, and their probabilities.
+    share : float
+        Of the full loss that hits take off.
     """
-    drags = drag.value + drag.error * _DRAGS
-    if drag.value >= 0.0:
-        drags = np.maximum(drags, 0.0)
     places = np.interp(friction[0], _FRICTIONS, np.arange(_FRICTIONS.size))
     below = np.minimum(places.astype(int), _FRICTIONS.size - 2)
     weights = np.bincount(below, friction[1] * (1.0 + below - places), _FRICTIONS.size)
     weights += np.bincount(below + 1, friction[1] * (places - below), _FRICTIONS.size)
-    likely = weights > _UNLIKELY * weights.max()
-    table = rubbed_table(impacts, _WALLS, _FRICTIONS[likely], drags)
-    by_friction = [marginal(rows.reshape(-1, _WALLS.size)) for rows in table]
+    rates = share * _CHANGE * _FRICTIONS / _free_height(impacts)
+    beside = [slowing.beside_friction(rate, _SHARE_SPREAD * rate) for rate in rates.tolist()]
+    logs = np.array([log_likelihood for _, log_likelihood in beside])
+    weights = weights * np.exp(logs - logs.max())
+    weights /= weights.sum()
+    drag_time = float(np.mean(impacts[:, DRAG_TIME]))
+    by_friction, likely = [], np.flatnonzero(weights > _UNLIKELY * weights.max())
+    for k in likely.tolist():
+        drag = beside[k][0]
+        errors = _FEW_DRAGS if drag.error * drag_time < _FAINT else _MANY_DRAGS
+        drags = np.maximum(drag.value + drag.error * errors, 0.0)
+        table = rubbed_table(impacts, _WALLS, share * _FRICTIONS[k : k + 1], drags)
+        by_friction.append(marginal(table.reshape(-1, _WALLS.size)))
     logs = log_sum(np.array(by_friction), weights[likely])
     return Likelihood1D(restitution=_WALLS, log_likelihood=logs)
+
+
+def _free_height(impacts: NDArray[np.float64]) -> float:
+    """Way of beads from floor to lid, [m]; infinite where they meet neither."""
+    hits = impacts[:, HITS_BEFORE] + impacts[:, HITS_AFTER]
+    meets = (hits > 0.0) & (impacts[:, VERTICAL_AFTER] > 0.0)
+    if not meets.any():
+        return math.inf
+    ways = impacts[meets, FRICTION_LENGTH] * (
+        1.0 / impacts[meets, VERTICAL_BEFORE] + 1.0 / impacts[meets, VERTICAL_AFTER]
+    )
+    return float(np.median(ways / hits[meets]))
 
 
 def rubbed_table(
@@ -104,7 +142,7 @@ def rubbed_table(
     grid : ndarray (n_grid,)
         Restitutions of the side walls, rising.
     frictions : ndarray (n_frictions,)
-        Coefficients of friction of floor and lid.
+        Coefficients of friction of floor and lid, as hits act beside a rebound.
     drags : ndarray (n_drags,), [1/s]
         Of the gas, for the first species.
 

@@ -80,6 +80,24 @@ class Slowing:
         """Drag of the gas, [1/s]."""
         return Measured(float(self.values[0]), math.sqrt(max(self.covariance[0, 0], 0.0)))
 
+    def beside_friction(self, rate: float, error: float) -> tuple[Measured, float]:
+        """The drag beside a friction rate, and the log likelihood of that rate, 0 at best.
+
+        Both slow a bead, so that the flights leave the less drag the more friction there is.
+
+        Parameters
+        ----------
+        rate, error : float, [1/m]
+        """
+        if not self.covariance[1, 1] > 0.0:
+            # No flights tell it.
+            return self.drag, 0.0
+        variance = float(self.covariance[1, 1]) + error**2
+        gain, off = float(self.covariance[0, 1]) / variance, rate - float(self.values[1])
+        rest = float(self.covariance[0, 0]) - gain * float(self.covariance[0, 1])
+        drag = Measured(float(self.values[0]) + gain * off, math.sqrt(max(rest, 0.0)))
+        return drag, -0.5 * (off**2 / variance + math.log(variance / self.covariance[1, 1]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightLosses:
@@ -96,7 +114,9 @@ class FlightLosses:
     flights : int
         Number of flights used.
     rubbed : Slowing
-        Drag and friction rate, where both may be.
+        Drag and friction rate, where both may be; neither is below 0.
+    fitted : Slowing
+        The same as the flights tell them, also below 0.
     """
 
     drag: Measured = UNKNOWN_MEASURED
@@ -104,6 +124,7 @@ class FlightLosses:
     covariance: NDArray[np.float64]
     flights: int = 0
     rubbed: Slowing
+    fitted: Slowing
 
     @property
     def slowing(self) -> Slowing:
@@ -182,17 +203,21 @@ def flight_losses(table: NDArray[np.float64], prior: Measured) -> FlightLosses:
             acceleration=unknown[0],
             covariance=unknown[1],
             rubbed=Slowing.by_drag(drag),
+            fitted=Slowing.by_drag(drag),
         )
     design = _design(used)
     fit, covariance = _with_prior(*_robust_fit(used, design[:, :, :3]), prior)
     both, errors = _with_prior(*_robust_fit(used, design), prior)
-    chosen = np.ix_([0, 3], [0, 3])
+    fitted = Slowing(
+        values=both[[0, 3]], covariance=_RUBBED_ERRORS**2 * errors[np.ix_([0, 3], [0, 3])]
+    )
     return FlightLosses(
         drag=Measured(float(fit[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))),
         acceleration=fit[1:],
         covariance=covariance[1:, 1:],
         flights=len(used),
-        rubbed=_not_below_zero(both[[0, 3]], _RUBBED_ERRORS**2 * errors[chosen]),
+        rubbed=_not_below_zero(fitted.values, fitted.covariance),
+        fitted=fitted,
     )
 
 

@@ -13,14 +13,15 @@ from nanorocks_ros.inference.contacts.contact_likelihood import rebound_log_like
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
 from nanorocks_ros.inference.contacts.impact_tables import rebound_impacts
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_likelihood
+from nanorocks_ros.inference.contacts.rubbed_rebounds import SLIDING, rubbed_likelihood
+from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import Measured
 
 FREE_HEIGHT, SPREAD, RESTITUTION = 1e-3, 2e-3, 0.95
 RATE, POINTS, JITTER = 30.0, 24, 2e-5
 ENDS = np.array([0.025, 0.5, 0.975])
-NO_DRAG = Measured(0.0, 0.0)
+NO_DRAG = Slowing.by_drag(Measured(0.0, 0.0))
 
 
 def _only(friction):
@@ -71,7 +72,8 @@ def _rebounds(seed, n, friction):
 
 
 def _quantiles(rebounds, friction, drag=NO_DRAG):
-    likelihood = rubbed_likelihood(rebound_impacts(list(rebounds)), drag, friction)
+    # These beads do not spin.
+    likelihood = rubbed_likelihood(rebound_impacts(list(rebounds)), drag, friction, SLIDING)
     return likelihood.posterior((0.5, 1.0)).quantiles(ENDS)
 
 
@@ -119,10 +121,10 @@ def test_each_rebound_is_read_at_the_drag_and_with_its_error():
     np.testing.assert_allclose(
         _quantiles(taken_out, _only(0.0)), _quantiles(rebounds, _only(0.0)), atol=5e-4
     )
-    low, middle, high = _quantiles(rebounds, _only(0.0), Measured(0.05, 0.0))
+    low, middle, high = _quantiles(rebounds, _only(0.0), Slowing.by_drag(Measured(0.05, 0.0)))
     shift = 0.05 * 2.0 * 0.5 * POINTS / RATE * RESTITUTION
     assert middle - _quantiles(rebounds, _only(0.0))[1] == pytest.approx(shift, rel=0.25)
-    unsure = _quantiles(rebounds, _only(0.0), Measured(0.05, 0.02))
+    unsure = _quantiles(rebounds, _only(0.0), Slowing.by_drag(Measured(0.05, 0.02)))
     assert unsure[2] - unsure[0] > high - low
 
 

@@ -10,6 +10,7 @@ from bent_flights import bent_flights
 
 from nanorocks_ros.inference.flights.flight_losses import (
     MIN_FLIGHTS,
+    Slowing,
     flight_losses,
     flight_table,
 )
@@ -148,3 +149,34 @@ def test_friction_alone_passes_for_drag_where_it_is_left_out():
 def test_a_known_drag_stays_beside_friction():
     table = flight_table(bent_flights(200, 0.02, friction_rate=10.0))
     assert flight_losses(table, Measured(0.02, 0.0)).rubbed.drag == Measured(0.02, 0.0)
+
+
+def test_the_more_friction_the_less_drag_do_flights_leave():
+    losses = flight_losses(flight_table(bent_flights(200, 0.02, friction_rate=10.0)), WIDE)
+    fitted = losses.fitted
+    rates = np.array([0.0, 10.0, 20.0])
+    beside = [fitted.beside_friction(rate, 0.0) for rate in rates]
+    drags = np.array([drag.value for drag, _ in beside])
+    assert (np.diff(drags) < 0.0).all()
+    # Without friction all that slows the flights is drag.
+    assert drags[0] > losses.drag.value > fitted.values[0]
+    assert beside[1][1] > max(beside[0][1], beside[2][1])
+    # Mean and covariance of both follow from the drag beside each rate and its likelihood.
+    grid = fitted.values[1] + np.sqrt(fitted.covariance[1, 1]) * np.linspace(-6.0, 6.0, 2001)
+    beside = [fitted.beside_friction(rate, 0.0) for rate in grid]
+    weight = np.exp([log_likelihood for _, log_likelihood in beside])
+    weight /= weight.sum()
+    drags = np.array([drag.value for drag, _ in beside])
+    mean = weight @ drags
+    assert mean == pytest.approx(fitted.values[0])
+    spread = beside[0][0].error ** 2 + weight @ (drags - mean) ** 2
+    assert spread == pytest.approx(fitted.covariance[0, 0], rel=1e-4)
+    assert weight @ ((drags - mean) * grid) == pytest.approx(fitted.covariance[0, 1], rel=1e-3)
+
+
+def test_an_unsure_friction_rate_leaves_the_drag_less_sure():
+    fitted = flight_losses(flight_table(bent_flights(200, 0.02, friction_rate=10.0)), WIDE).fitted
+    sure, unsure = (fitted.beside_friction(10.0, error)[0] for error in (0.0, 20.0))
+    assert unsure.error > sure.error
+    known = Measured(0.02, 0.001)
+    assert Slowing.by_drag(known).beside_friction(10.0, 5.0) == (known, 0.0)

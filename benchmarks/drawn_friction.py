@@ -1,0 +1,177 @@
+"""Walls and beads of drawn gases with drag and friction, from true tracks.
+
+Trays, gases and their starts are drawn as for `drawn_films`, at 15 to 60 frames/s and with errors
+of places of 0.05 to 0.2 px beside shared ones: what is wrong here is physics, what is wrong in
+films alone is recognition. The second table tells friction and drag as they are, and reads the
+walls with shares of what hits of floor and lid take off: their mean error over the stated one is
+0 where the share is right.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.contacts import METRE_PX, contacts_of, true_tracks
+from benchmarks.coverage import coverage
+from benchmarks.drawn_films import drawn_gas
+from benchmarks.friction_films import ROWS
+from nanorocks_ros.cli.progress_bar import Progress
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.inference.contacts.contact_likelihood import marginal
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+from nanorocks_ros.inference.contacts.dragged_contacts import dragged
+from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_table
+from nanorocks_ros.inference.decay.decay_library_file import library_of
+from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
+from nanorocks_ros.inference.decay.decay_tables import tables_of
+from nanorocks_ros.inference.decay.friction_weights import friction_weights
+from nanorocks_ros.inference.flights.flight_losses import flight_losses, flight_table
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.inference.restitution_sources import restitution_sources
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
+from nanorocks_ros.records import NS, FreeFlight, Headline, Interval, Measured
+from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_CYCLES = {1: 80, 3: 24}
+_SECONDS, _FIRST, _EVERY, _ERROR = 25.0, 1.75, 0.1, 0.02
+_RATES, _JITTERS = (15.0, 24.0, 30.0, 60.0), (0.05, 0.1, 0.2)
+_ENDS = np.array([0.025, 0.5, 0.975])
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of what a hit takes off a bead that slides."""
+_WALLS = np.linspace(0.5, 1.0, 251)
+_FEWEST = 5
+_PRIOR = PriorSettings()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnCycle:
+    """What one cycle tells.
+
+    Parameters
+    ----------
+    beads, walls : Interval
+        Headlines less the truth.
+    from_contacts : bool
+    pulls : tuple of float
+        Error of the walls over the stated one for each of `SHARES`, with friction and drag known.
+    """
+
+    beads: Interval
+    walls: Interval
+    from_contacts: bool
+    pulls: tuple[float, ...]
+
+
+def report() -> None:
+    """Print both tables."""
+    cases = {
+        (number, *row): [(number, run, *row) for run in range(cycles)]
+        for number, cycles in _CYCLES.items()
+        for row in ROWS
+    }
+    tasks = {str(task): task for same in cases.values() for task in same}
+    with Progress('true tracks') as progress:
+        cycles = dict(
+            zip(tasks, run_tasks(_cycle_of, tasks, Workers(), progress.count), strict=True)
+        )
+    by_case = {case: [cycles[str(task)] for task in same] for case, same in cases.items()}
+    print(
+        '\n| tray | drag [1/s] | friction | cycles | from contacts | beads: holds | half-width | '
+        'median error | walls: holds | half-width | median error |\n' + '| --- ' * 11 + '|'
+    )
+    for (number, drag, friction), read in by_case.items():
+        share = np.mean([cycle.from_contacts for cycle in read])
+        cells = [f'{number} | {drag:g} | {friction:g} | {len(read)} | {share:.2f}']
+        for name in ('beads', 'walls'):
+            seen = coverage([getattr(cycle, name) for cycle in read], 0.0)
+            cells.append(f'{seen.holds:.2f} | {seen.half_width:.4f} | {seen.median_error:+.4f}')
+        print(f'| {" | ".join(cells)} |')
+    print('\n| tray | drag [1/s] | friction |', end='')
+    print(''.join(f' {share:g} |' for share in SHARES) + '\n' + '| --- ' * (3 + len(SHARES)) + '|')
+    for (number, drag, friction), read in by_case.items():
+        if friction:
+            pulls = np.nanmean([cycle.pulls for cycle in read], axis=0)
+            cells = ' | '.join(f'{pull:+.2f}' for pull in pulls)
+            print(f'| {number} | {drag:g} | {friction:g} | {cells} |')
+
+
+def _cycle_of(task: tuple[int, int, float, float]) -> DrawnCycle:
+    return drawn_cycle(*task)
+
+
+def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCycle:
+    """A drawn gas and what its true tracks tell.
+
+    Parameters
+    ----------
+    number, run, drag, friction
+        As of `drawn_gas`.
+    """
+    tray, values = drawn_gas(number, run, drag, friction)
+    rate, jitter = _RATES[run % len(_RATES)], _JITTERS[run % len(_JITTERS)] / METRE_PX
+    values |= {'first_shake': 0.0, 'seed': 9000 + run, 'frame_rate': rate}
+    settings = with_values(SimulationSettings(), values, 'benchmark')
+    times: list[float] = []
+    speeds: list[float] = []
+
+    def watched() -> Iterator:
+        for tracks in true_tracks(tray, settings, 0, round(_SECONDS * rate), jitter):
+            times.append(tracks.stamp_ns / NS)
+            speeds.append(float(np.hypot(*tracks.velocities.T).mean()))
+            yield tracks
+
+    nominal = load_trays()[number]
+    contacts = contacts_of(nominal, watched())
+    time = np.array(times)
+    used = np.flatnonzero(time >= _FIRST)[:: max(round(_EVERY * rate), 1)]
+    noise = np.random.default_rng([run, 5]).standard_normal(used.size)
+    speed = np.array(speeds)[used] * np.exp(_ERROR * noise)
+    cooling = [contact for contact in contacts if contact.stamp_ns >= _FIRST * NS]
+    flights = flight_table(contact for contact in cooling if isinstance(contact, FreeFlight))
+    losses = flight_losses(flights, Measured(_PRIOR.drag, _PRIOR.drag_error))
+    terms = ContactTerms.of(
+        dragged(contact, losses.slowing.drag.value)
+        for contact in cooling
+        if not isinstance(contact, FreeFlight)
+    )
+    library = library_of(nominal)
+    tables = tables_of(library, nominal, _PRIOR)
+    camera = math.hypot(_PRIOR.scale_error, library.misfit), _PRIOR.speed_bias
+    decay = decay_likelihood(tables, time[used], speed, _ERROR * speed, camera, losses.drag)
+    integrated = decay.integrated(friction_weights(_PRIOR, terms))
+    sources = restitution_sources(tables, integrated, terms, _PRIOR, losses=losses)
+    errors = [
+        Interval(*(limit - float(values[name]) for limit in (own.value, own.lower, own.upper)))
+        for own, name in zip(
+            sources.intervals(_ENDS), ('restitution', 'wall_restitution'), strict=True
+        )
+    ]
+    return DrawnCycle(
+        beads=errors[0],
+        walls=errors[1],
+        from_contacts=sources.headline is Headline.CONTACTS,
+        pulls=_pulls(terms, (drag, friction), float(values['wall_restitution'])),
+    )
+
+
+def _pulls(terms: ContactTerms, known: tuple[float, float], truth: float) -> tuple[float, ...]:
+    """Error of the walls over the stated one, by shares of what hits take off."""
+    if terms.rebounds < _FEWEST:
+        return (math.nan,) * len(SHARES)
+    drag, friction = known
+    pulls = []
+    for share in SHARES:
+        hits, drags = np.array([share * friction]), np.array([drag])
+        table = rubbed_table(terms.rebound_impacts, _WALLS, hits, drags)
+        logs = marginal(table.reshape(-1, _WALLS.size))
+        likelihood = Likelihood1D(restitution=_WALLS, log_likelihood=logs)
+        posterior = likelihood.convolved(_PRIOR.rebound_bias).posterior((0.5, 1.0))
+        pulls.append((posterior.mean - truth) / posterior.deviation)
+    return tuple(pulls)
