@@ -5,15 +5,18 @@ Spheres, container, restitutions, colours, light and camera are drawn; the engin
 package. Each film is measured by `nanorocks_ros.measure`, told what can be read off a picture or a
 ruler. ``NANOROCKS_FILM_COUNT`` is the number of films of each row, 4 by default. Films and results
 are kept in `filmed_cycles.folder`, so that an interrupted run goes on.
+``python -m benchmarks.lab_films PICTURE`` shows a frame of the first films.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 import nanorocks_ros as nr
@@ -180,9 +183,7 @@ def _draw(film: LabFilm) -> None:
     rate = EXPOSURES * truth.camera.rate
     run = soft_run(truth.box, _SECONDS, rate=rate, seed=film.number)
     film.video.parent.mkdir(parents=True, exist_ok=True)
-    part = film.video.with_name(f'part_{film.video.name}')
-    write_shaded_film(part, run, truth.box, truth.species, truth.camera)
-    part.replace(film.video)
+    write_shaded_film(film.video, run, truth.box, truth.species, truth.camera)
 
 
 def _measure(film: LabFilm) -> None:
@@ -259,3 +260,28 @@ def _interval(told: dict[str, float], name: str) -> str:
     if not told or not math.isfinite(told[f'{name}_lower']):
         return ''
     return f'{told[name]:.3f} [{told[f"{name}_lower"]:.3f}, {told[f"{name}_upper"]:.3f}]'
+
+
+def picture(path: Path) -> None:
+    """Write one frame of each of the first films without friction and drag, side by side."""
+    films = [LabFilm(number=number, friction=0.0, drag=0.0) for number in range(_FILMS)]
+    _run('drawing films', _draw, [film for film in films if not film.video.exists()])
+    frames = [_frame(film.video) for film in films]
+    rows = max(len(frame) for frame in frames)
+    tall = [
+        cv2.copyMakeBorder(frame, 0, rows - len(frame), 0, 8, cv2.BORDER_CONSTANT, value=[255] * 3)
+        for frame in frames
+    ]
+    cv2.imwrite(str(path), np.hstack(tall)[:, :-8])
+
+
+def _frame(video: Path) -> np.ndarray:
+    """A frame after the shaking."""
+    film = cv2.VideoCapture(str(video))
+    film.set(cv2.CAP_PROP_POS_MSEC, 6e3)
+    _, frame = film.read()
+    return frame
+
+
+if __name__ == '__main__':
+    picture(Path(sys.argv[1]))
