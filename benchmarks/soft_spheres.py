@@ -37,7 +37,8 @@ class SoftBox:
     friction : float
         Of Coulomb, at all contacts.
     drag : float, [1/s]
-        Of Stokes; a sphere alone slows down as exp(-drag t).
+        Of Stokes, of the first sphere: alone it slows down as exp(-drag t). The force on others
+        is as much larger as their radius.
     speed : float, [m/s]
         Standard deviation of a component of the first velocities.
     rest : float, [s]
@@ -182,7 +183,7 @@ def _follow(state, beads, shaken, constants, kept, scratch, every):
                     kept[1][k // every, i, c] = velocities[i, c]
         for i in range(len(radii)):
             for c in range(3):
-                forces[i, c] = -masses[i] * drag * velocities[i, c]
+                forces[i, c] = -drag * masses[0] * radii[i] / radii[0] * velocities[i, c]
                 torques[i, c] = 0.0
         collisions += _press_each_other(state, beads, constants, scratch)
         _press_walls(state, beads, (displacement[k], box_velocity[k]), constants, scratch)
