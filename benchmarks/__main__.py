@@ -39,6 +39,7 @@ ALL = (
     'ranks',
     'contacts_alone',
     'short_films',
+    'lab_films',
     'own_tray',
     'oblique',
     'python_interface',

@@ -186,7 +186,11 @@ def _measured_tray(
         container_known=known,
         verdicts=tracked.verdicts[number],
     )
-    decay_lines = [plan.name_files(line) for line in _decay_lines(plan, step, teller)]
+    decay_lines = [
+        line
+        for line in map(plan.name_files, _decay_lines(plan, step, teller))
+        if line.removeprefix(DECAY_PREFIX) not in tracked.notices
+    ]
     for line in decay_lines:
         teller.say(line)
     return MeasuredTray(
@@ -221,7 +225,7 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     said = {line for verdict in step.verdicts for line in verdict.lines()}
     lines = [
         f'{DECAY_PREFIX}{line.strip()}'
-        for line in tray_lines(analysis, analysis.trays[number])
+        for line in (*analysis.notices, *tray_lines(analysis, analysis.trays[number]))
         if line.strip() not in said
     ]
     write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())

@@ -131,6 +131,7 @@ def test_a_wrong_diameter_is_told_from_a_wrong_scale(factor):
     check, (text,) = checked(replace(TRAYS[1], species=(own,)), true_tray=TRAYS[1])
     assert check.flag
     assert 'beads look 2.00 mm large: correct diameter_mm of tray 1' in text
+    assert ('light them from all sides' in text) == (factor > 1.0)
     assert 'pixels-per-metre' not in text
 
 

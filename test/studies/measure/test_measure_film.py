@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -141,3 +142,12 @@ def test_beads_that_are_not_there_are_said_and_the_exit_code_is_three(film, tmp_
     arguments = ['--diameter-px', '24', '--count', '7', '-o', str(out)]
     assert main(['measure', str(film), *arguments]) == 3
     assert 'NOT USABLE' in (out / 'report.html').read_text()
+
+
+def test_what_the_decay_says_on_the_way_is_told(tmp_path, capsys):
+    bag = Path(__file__).resolve().parents[3] / 'bags/tray_1_sample'
+    out = tmp_path / 'out'
+    assert main(['measure', str(bag), '--pixels-per-metre', '12800', '-o', str(out)]) == 0
+    assert 'decay: tray 1: the rulers of the scale disagree' in capsys.readouterr().out
+    lines = json.loads((out / 'measured.json').read_text())['trays']['1']['decay']
+    assert any('the rulers of the scale disagree' in line for line in lines)
