@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.accelerated_tray import AcceleratedTray
 from benchmarks.contacts import tracks_of
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.contacts.contacts_alone import contacts_alone
+from nanorocks_ros.inference.contacts_alone import contacts_alone
 from nanorocks_ros.settings import PipelineSettings, PriorSettings, SimulationSettings
 from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 

@@ -7,19 +7,16 @@ contradict it, or show that walls rub, only the contacts are believed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_terms import NO_SLOWING
-from nanorocks_ros.inference.contacts.rubbed_rebounds import SLIDING
-from nanorocks_ros.inference.decay.friction_weights import friction_weights
-from nanorocks_ros.inference.flights.flight_losses import Slowing
 from nanorocks_ros.inference.posterior import Posterior, posterior_of
 from nanorocks_ros.inference.speed_dependence import SpeedDependence
-from nanorocks_ros.numerics.log_sums import log_sum
+from nanorocks_ros.inference.wall_likelihoods import walls_of_either, walls_of_rolling
 from nanorocks_ros.records import (
     UNKNOWN_INTERVAL,
     UNKNOWN_MEASURED,
@@ -35,15 +32,12 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
     from nanorocks_ros.inference.decay.decay_tables import DecayTables
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
-    from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
+    from nanorocks_ros.inference.likelihood_1d import Posterior1D
     from nanorocks_ros.settings import PriorSettings
 
 NO_DEPENDENCE = SpeedDependence()
 """Of restitutions that are not compared at different speeds."""
 
-# Where contacts are believed alone walls rub: the prior of their friction, whose error is that of
-# walls that hardly do, is wider by this. By default 0.03 is then half as likely as 0.
-_WIDER = 10.0
 # Of its loss by which a restitution reads high, and by how much that may differ, where decay and
 # contacts of a gas that depends on speed are read as those of a constant one: 0.11 to 0.13 at an
 # exponent of 0.2, 0.24 to 0.25 at 0.6 (`python -m benchmarks speed_headlines`).
@@ -181,7 +175,7 @@ def restitution_sources(
     walls = prior.min_wall_restitution, prior.max_wall_restitution
     slowing = losses.slowing if losses else NO_SLOWING
     bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-    wall_likelihood = _wall_likelihood(contacts, prior, losses)
+    wall_likelihood = walls_of_rolling(contacts, prior, losses)
     joint = posterior_of(
         tables,
         log_likelihood,
@@ -199,7 +193,7 @@ def restitution_sources(
         slowing = losses.rubbed if losses else NO_SLOWING
         drag = slowing.drag if losses else UNKNOWN_MEASURED
         bead_likelihood = contacts.bead_likelihood(prior.collision_bias, slowing)
-        wall_likelihood = _rubbed(wall_likelihood, contacts, prior, slowing)
+        wall_likelihood = walls_of_either(contacts, prior, losses, wall_likelihood)
     return RestitutionSources(
         joint=joint,
         decay=posterior_of(tables, log_likelihood, walls) if number else joint,
@@ -210,45 +204,6 @@ def restitution_sources(
         drag=drag,
         dependence=dependence,
     )
-
-
-def _wall_likelihood(
-    contacts: ContactTerms, prior: PriorSettings, losses: FlightLosses | None
-) -> Likelihood1D | None:
-    """Log likelihood of the wall restitution where floor and lid may rub as the walls do."""
-    weights = friction_weights(prior, contacts)
-    if weights is None:
-        # Only where no bead rebounds by itself.
-        slowing = losses.slowing if losses else NO_SLOWING
-        return contacts.wall_likelihood(prior.rebound_bias, slowing)
-    return contacts.rubbed_wall_likelihood(
-        prior.rebound_bias,
-        losses.fitted if losses else NO_SLOWING,
-        (weights.friction, weights.weight),
-    )
-
-
-def _rubbed(
-    rolling: Likelihood1D | None, contacts: ContactTerms, prior: PriorSettings, slowing: Slowing
-) -> Likelihood1D | None:
-    """Log likelihood of the walls where beads may as well slide at each hit, equally likely.
-
-    Sliding beads take more hits that show, so that flights do not tell their friction.
-    """
-    wide = replace(prior, friction_error=_WIDER * prior.friction_error)
-    weights = friction_weights(wide, contacts)
-    if weights is None or rolling is None:
-        return rolling
-    sliding = contacts.rubbed_wall_likelihood(
-        prior.rebound_bias,
-        Slowing.by_drag(slowing.drag),
-        (weights.friction, weights.weight),
-        SLIDING,
-    )
-    if sliding is None:
-        return rolling
-    both = np.array([rolling.log_likelihood, sliding.log_likelihood])
-    return replace(rolling, log_likelihood=log_sum(both))
 
 
 def intervals_of(posterior: Posterior, ends: NDArray[np.float64]) -> tuple[Interval, Interval]:

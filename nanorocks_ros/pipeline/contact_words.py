@@ -14,7 +14,7 @@ from nanorocks_ros.records import WALL_NAMES
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.film_section import FilmSection
-    from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
+    from nanorocks_ros.inference.contacts_alone import RestitutionOfContacts
     from nanorocks_ros.stages.contact_restitution.track_contacts import TrackContacts
 
 _STANDARD_GRAVITY = 9.80665

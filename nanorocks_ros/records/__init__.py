@@ -28,6 +28,7 @@ from nanorocks_ros.records.headlines import AGREEMENT_TENSION as AGREEMENT_TENSI
 from nanorocks_ros.records.headlines import Headline as Headline
 from nanorocks_ros.records.headlines import headline_in_words as headline_in_words
 from nanorocks_ros.records.headlines import headline_of as headline_of
+from nanorocks_ros.records.headlines import walls_rub as walls_rub
 from nanorocks_ros.records.quality_flags import NOTHING_WRONG as NOTHING_WRONG
 from nanorocks_ros.records.quality_flags import UNKNOWN as UNKNOWN
 from nanorocks_ros.records.quality_flags import CorRelation as CorRelation

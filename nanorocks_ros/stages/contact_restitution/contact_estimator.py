@@ -9,7 +9,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.inference.contacts.contacts_alone import contacts_alone
+from nanorocks_ros.inference.contacts_alone import contacts_alone
 from nanorocks_ros.records import (
     NS,
     ContactOrFlight,
@@ -30,7 +30,7 @@ from nanorocks_ros.stages.stage import RestartingStage
 
 if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
-    from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
+    from nanorocks_ros.inference.contacts_alone import RestitutionOfContacts
     from nanorocks_ros.settings import PipelineSettings
 
 # The estimate is of the last contacts and flights, so many.
@@ -95,10 +95,17 @@ class ContactEstimator(RestartingStage[ContactInput, CorEstimate]):
     def _estimate(self, status: CorStatus) -> CorEstimate:
         cooling = self._settings.cooling
         contacts = [record for record in self._contacts if not isinstance(record, FreeFlight)]
-        if math.isnan(self._tray.dimensions[2]):
+        height_known = not math.isnan(self._tray.dimensions[2])
+        if not height_known:
             contacts = with_seen_reach(contacts)
         flights = [record for record in self._contacts if isinstance(record, FreeFlight)]
-        alone = contacts_alone(contacts, flights, self._settings.prior, cooling.probability)
+        alone = contacts_alone(
+            contacts,
+            flights,
+            self._settings.prior,
+            cooling.probability,
+            height_known=height_known,
+        )
         beads, walls = _interval(alone.beads), _interval(alone.walls)
         is_known = math.isfinite(beads.value) or math.isfinite(walls.value)
         return CorEstimate(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from nanorocks_ros.inference.contacts.contacts_alone import ContactsAlone, contacts_alone
+from nanorocks_ros.inference.contacts_alone import ContactsAlone, contacts_alone
 from nanorocks_ros.records import FreeFlight, Measured, PairCollision, Rebound
 from nanorocks_ros.stages.contact_restitution.collision_reach import (
     ANY_HEIGHT,
@@ -143,7 +143,9 @@ class ContactScene(NamedTuple):
         own = contacts if self.height_told else with_seen_reach(contacts)
         return TrackContacts(
             contacts=tuple(contacts),
-            alone=contacts_alone(own, flights, settings.prior, probability),
+            alone=contacts_alone(
+                own, flights, settings.prior, probability, height_known=self.height_told
+            ),
             acceleration=self.acceleration,
             walls=self.walls,
             frames=frames,

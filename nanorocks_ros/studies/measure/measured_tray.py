@@ -12,7 +12,7 @@ from nanorocks_ros.outputs.json_values import json_values
 from nanorocks_ros.pipeline.contact_words import restitutions
 
 if TYPE_CHECKING:
-    from nanorocks_ros.inference.contacts.contacts_alone import RestitutionOfContacts
+    from nanorocks_ros.inference.contacts_alone import RestitutionOfContacts
     from nanorocks_ros.pipeline.contact_words import LengthUnit
     from nanorocks_ros.stages.contact_restitution.track_contacts import TrackContacts
     from nanorocks_ros.studies.measure.track_speeds import TrackSpeeds

@@ -11,6 +11,7 @@ from bead_paths import PIXEL, RATE, tracks_of
 
 from benchmarks.accelerated_tray import AcceleratedTray
 from benchmarks.short_films import CASES, flat_tracks, high_tracks
+from benchmarks.soft_spheres import SoftBox, soft_run
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.engine.gas import HardSphereGas
@@ -166,3 +167,31 @@ def test_the_tilt_of_collisions_follows_from_their_distances_whatever_the_diamet
         errors = np.array([value.error for value in beads])
         assert abs(off.mean()) < 2.0 * errors.mean() / math.sqrt(off.size)
         assert np.abs(off / errors).max() < 2.5
+
+
+def rubbing(friction, seed):
+    """Contacts of soft spheres of 2 mm in tray 1, which is higher than they, with friction."""
+    box = SoftBox(
+        sides=TRAY.dimensions,
+        radii=(1e-3,) * TRAY.count,
+        masses=(5e-6,) * TRAY.count,
+        wall_restitution=0.9,
+        friction=friction,
+        speed=0.01,
+        rest=0.0,
+        amplitude=0.0,
+    )
+    run = soft_run(box, 14.0, rate=RATE, seed=seed)
+    paths, velocities = run.positions[..., :2], run.velocities[..., :2]
+    tracks = list(tracks_of(paths, velocities=velocities, jitter=NOISE))
+    return track_contacts(tracks, TRAY, SETTINGS).alone
+
+
+def test_walls_that_rub_are_held_and_those_that_do_not_are_as_exact():
+    # Read as smooth 9 of 15 intervals held.
+    rough = [rubbing(friction, seed).walls for friction in (0.02, 0.05, 0.1) for seed in range(5)]
+    held = [walls.restitution.lower < 0.9 < walls.restitution.upper for walls in rough]
+    assert np.mean(held) > 0.85
+    smooth = [rubbing(0.0, seed).walls.restitution for seed in range(5)]
+    assert np.mean([walls.lower < 0.9 < walls.upper for walls in smooth]) > 0.7
+    assert np.mean([walls.upper - walls.lower for walls in smooth]) < 0.01

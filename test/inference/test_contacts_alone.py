@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from wall_rebounds import wall_rebounds
 
-from nanorocks_ros.inference.contacts.contacts_alone import contacts_alone
+from nanorocks_ros.inference.contacts_alone import contacts_alone
 from nanorocks_ros.records import PairCollision
 from nanorocks_ros.settings import PriorSettings
 

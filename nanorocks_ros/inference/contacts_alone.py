@@ -12,6 +12,7 @@ from nanorocks_ros.inference.contacts.contact_likelihood import (
     pair_table,
     rebound_table,
 )
+from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import (
     dragged,
     loss_beside_contacts,
@@ -24,6 +25,7 @@ from nanorocks_ros.inference.flights.flight_losses import (
     flight_table,
 )
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.inference.wall_likelihoods import walls_of_either, walls_of_rolling
 from nanorocks_ros.records import (
     ONE_SIGMA,
     UNKNOWN,
@@ -33,6 +35,7 @@ from nanorocks_ros.records import (
     MeasuredInterval,
     PairCollision,
     Rebound,
+    walls_rub,
 )
 
 if TYPE_CHECKING:
@@ -40,12 +43,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.inference.likelihood_1d import Posterior1D
     from nanorocks_ros.settings import PriorSettings
 
 # A single contact determines a restitution to 0.003 at best.
 _GRID = np.linspace(0.0, 1.0, 1001)
 # Largest standard deviation of a restitution that is given: a flat one from 0 to 1 has 0.29.
 _LARGEST_DEVIATION = 0.2
+# Walls with friction are compared with restitutions from 0.5 on.
+_LOWEST_RUBBED = 0.55
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +103,8 @@ def contacts_alone(
     flights: Iterable[FreeFlight],
     prior: PriorSettings,
     probability: float = 0.95,
+    *,
+    height_known: bool = True,
 ) -> ContactsAlone:
     """Restitutions from contacts in any state of motion: cooling, driven, steady.
 
@@ -109,6 +117,8 @@ def contacts_alone(
         Systematic errors of contacts, and what is known of the drag.
     probability : float
         Of the intervals.
+    height_known : bool
+        Whether the height of the tray is; where walls rub floor and lid then do as well.
     """
     losses = flight_losses(flight_table(flights), Measured(prior.drag, prior.drag_error))
     # With fewer flights the prior alone would speak, which is that of a gas at low pressure.
@@ -122,11 +132,23 @@ def contacts_alone(
         if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
     ]
     numbers = sorted({rebound.wall for rebound in rebounds})
+    terms = ContactTerms.of(rebounds)
+    may_rub = height_known and is_measured
+    rubs = walls_rub(terms.wall_friction)
 
     def walls(some: Sequence[Rebound]) -> RestitutionOfContacts:
         speeds = [rebound.incoming.value for rebound in some]
         table = rebound_table(some, _GRID)
-        return _restitution(table, some, speeds, (slowing, prior.rebound_bias, probability))
+        smooth = _restitution(table, some, speeds, (slowing, prior.rebound_bias, probability))
+        if not (may_rub and smooth.restitution.lower > _LOWEST_RUBBED):
+            return smooth
+        own = ContactTerms.of(some)
+        likelihood = walls_of_rolling(own, prior, losses, terms)
+        if rubs:
+            likelihood = walls_of_either(own, prior, losses, likelihood, terms)
+        if likelihood is None:
+            return smooth
+        return _of_posterior(likelihood.posterior((0.5, 1.0)), len(some), speeds, probability)
 
     return ContactsAlone(
         beads=_restitution(
@@ -165,12 +187,18 @@ def _restitution(
     loss = loss_beside_contacts(loss_sums(contacts), slowing)
     slowed = likelihood.shifted(best * float(np.expm1(loss.value)))
     posterior = slowed.convolved(float(np.hypot(bias, best * loss.error))).posterior((0.0, 1.0))
+    return _of_posterior(posterior, len(contacts), speeds, probability)
+
+
+def _of_posterior(
+    posterior: Posterior1D, contacts: int, speeds: Sequence[float], probability: float
+) -> RestitutionOfContacts:
     halves = 0.5 * np.array([-probability, probability, -ONE_SIGMA, ONE_SIGMA])
     lower, upper, lower_68, upper_68 = posterior.quantiles(0.5 + halves).tolist()
     known = posterior.deviation <= _LARGEST_DEVIATION
     value = MeasuredInterval(posterior.mean, posterior.deviation, lower, upper)
     return RestitutionOfContacts(
-        contacts=len(contacts),
+        contacts=contacts,
         restitution=value if known else UNKNOWN_MEASURED_INTERVAL,
         speed=float(np.median(speeds)),
         lower_68=lower_68 if known else UNKNOWN,
