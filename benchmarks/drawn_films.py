@@ -10,12 +10,10 @@ interrupted run goes on where it was.
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import pickle
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +24,7 @@ from benchmarks.film_measurement import FilmResult, is_flagged, measure
 from benchmarks.film_truth import FilmTruth, read_truth
 from benchmarks.filmed_cycles import folder
 from benchmarks.rough_gas import SMOOTH, Roughness
+from benchmarks.source_key import source_key
 from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
@@ -42,6 +41,8 @@ COUNT = 'NANOROCKS_FILM_COUNT'
 """Environment variable with the number of drawn films of each tray."""
 
 _FILMS = 50
+# Modules beside the package that decide what is measured.
+_MEASURING = 'film_measurement.py', 'film_truth.py', 'place_errors.py'
 # Restitutions of beads that are drawn; those of the walls are drawn from their prior.
 _BEADS = (0.5, 1.0)
 _SHAKE = 1.0
@@ -185,17 +186,4 @@ def _measure(video: Path) -> None:
 
 
 def _result_file(video: Path) -> Path:
-    return folder() / f'measured_{_code_key()}' / f'{video.stem}.pickle'
-
-
-@cache
-def _code_key() -> str:
-    """Key of the code that measures."""
-    here = Path(__file__).resolve().parent
-    files = sorted((here.parent / 'nanorocks_ros').rglob('*.py'))
-    names = ('film_measurement.py', 'film_truth.py', 'place_errors.py')
-    files += [here / name for name in names]
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
+    return folder() / f'measured_{source_key(*_MEASURING)}' / f'{video.stem}.pickle'

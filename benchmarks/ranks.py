@@ -11,7 +11,6 @@ the code that simulates, so that after a change of the inference only that is re
 
 from __future__ import annotations
 
-import hashlib
 import math
 import pickle
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from scipy import stats
 from benchmarks.contacts import contacts_of, true_tracks
 from benchmarks.drawn import varied
 from benchmarks.filmed_cycles import folder
+from benchmarks.source_key import key_of
 from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
@@ -40,8 +40,6 @@ from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_value
 from nanorocks_ros.simulation.ensemble import cooling_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -253,7 +251,7 @@ def _code_key() -> str:
     here = Path(__file__).resolve().parent
     package = here.parent / 'nanorocks_ros'
     files = [*sorted(package.rglob('*.py')), *sorted(package.rglob('*.npz'))]
-    return _key([*files, *(here / name for name in ('ranks.py', 'drawn.py', 'contacts.py'))])
+    return key_of([*files, *(here / name for name in ('ranks.py', 'drawn.py', 'contacts.py'))])
 
 
 @cache
@@ -264,11 +262,4 @@ def _simulation_key() -> str:
         for name in _SIMULATING
         for file in sorted((here.parent / 'nanorocks_ros' / name).rglob('*.py'))
     ]
-    return _key([*files, here / 'ranks.py', here / 'drawn.py'])
-
-
-def _key(files: Iterable[Path]) -> str:
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
+    return key_of([*files, here / 'ranks.py', here / 'drawn.py'])
