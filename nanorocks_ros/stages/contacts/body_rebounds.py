@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.experiment.trays import Tray
 
-# A contact is looked at that long after it, [ns]: bodies are known a second after they merged.
+# A contact is looked at that long after it, [ns]: of bodies those count that are known by then.
 _DELAY_NS = 3 * NS // 2
 # Frames on each side of a contact, longer and longer: a fit to more is kept while it holds.
 _SPANS = (5, 7, 10, 14)
