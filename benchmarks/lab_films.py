@@ -240,7 +240,7 @@ def _row(film: LabFilm, held: dict[str, list[bool]]) -> str:
     if 'refusal' in found:
         return f'| {" | ".join(cells)} | {found["refusal"]} |' + ' |' * 9
     final = found.get('final', {})
-    cells.append(f'{final["drag"]:.4f}' if final else '')
+    cells.append(f'{final["drag"]:.4f}' if math.isfinite(final.get('drag', math.nan)) else '')
     truths = truth.box.restitution, truth.box.wall_restitution
     for kind, name, value in zip(
         ('beads', 'walls'), ('restitution', 'wall_restitution'), truths, strict=True
@@ -250,14 +250,14 @@ def _row(film: LabFilm, held: dict[str, list[bool]]) -> str:
         for told, key, source in ((alone, 'restitution', 'alone'), (final, name, 'headline')):
             cells.append(_interval(told, key))
             lower, upper = told.get(f'{key}_lower', math.nan), told.get(f'{key}_upper', math.nan)
-            if math.isfinite(lower):
+            if math.isfinite(told.get(key, math.nan)):
                 held.setdefault(f'{kind}, {source}', []).append(lower <= value <= upper)
     cells.append(final.get('flags', ''))
     return f'| {" | ".join(cells)} |'
 
 
 def _interval(told: dict[str, float], name: str) -> str:
-    if not told or not math.isfinite(told[f'{name}_lower']):
+    if not math.isfinite(told.get(name, math.nan)):
         return ''
     return f'{told[name]:.3f} [{told[f"{name}_lower"]:.3f}, {told[f"{name}_upper"]:.3f}]'
 

@@ -105,6 +105,7 @@ def contacts_alone(
     probability: float = 0.95,
     *,
     height_known: bool = True,
+    each_wall: bool = True,
 ) -> ContactsAlone:
     """Restitutions from contacts in any state of motion: cooling, driven, steady.
 
@@ -119,6 +120,8 @@ def contacts_alone(
         Of the intervals.
     height_known : bool
         Whether the height of the tray is; where walls rub floor and lid then do as well.
+    each_wall : bool
+        Whether each wall is wanted as well.
     """
     losses = flight_losses(flight_table(flights), Measured(prior.drag, prior.drag_error))
     # With fewer flights the prior alone would speak, which is that of a gas at low pressure.
@@ -131,21 +134,20 @@ def contacts_alone(
         for contact in own
         if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
     ]
-    numbers = sorted({rebound.wall for rebound in rebounds})
-    terms = ContactTerms.of(rebounds)
-    may_rub = height_known and is_measured
-    rubs = walls_rub(terms.wall_friction)
+    numbers = sorted({rebound.wall for rebound in rebounds}) if each_wall else []
+    # Floor and lid rub as the walls do, which all rebounds tell together.
+    friction = ContactTerms.of(rebounds) if height_known and is_measured else None
 
     def walls(some: Sequence[Rebound]) -> RestitutionOfContacts:
         speeds = [rebound.incoming.value for rebound in some]
         table = rebound_table(some, _GRID)
         smooth = _restitution(table, some, speeds, (slowing, prior.rebound_bias, probability))
-        if not (may_rub and smooth.restitution.lower > _LOWEST_RUBBED):
+        if friction is None or not smooth.restitution.lower > _LOWEST_RUBBED:
             return smooth
-        own = ContactTerms.of(some)
-        likelihood = walls_of_rolling(own, prior, losses, terms)
-        if rubs:
-            likelihood = walls_of_either(own, prior, losses, likelihood, terms)
+        own = friction if len(some) == len(rebounds) else ContactTerms.of(some)
+        likelihood = walls_of_rolling(own, prior, losses, friction)
+        if walls_rub(friction.wall_friction):
+            likelihood = walls_of_either(own, prior, losses, likelihood, friction)
         if likelihood is None:
             return smooth
         return _of_posterior(likelihood.posterior((0.5, 1.0)), len(some), speeds, probability)

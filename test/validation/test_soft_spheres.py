@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.soft_spheres import SoftBox, soft_run
+from benchmarks.shaded_film import LabCamera, shaded_pictures
+from benchmarks.soft_spheres import SoftBox, SoftRun, soft_run
 
 _RADIUS, _MASS = 1.5e-3, 5e-5
 
@@ -109,3 +110,43 @@ def test_all_rest_until_the_box_is_shaken():
     assert not run.displacement[:60].any()
     assert 0.5e-3 < np.abs(run.displacement).max() < 1.1e-3
     assert run.displacement[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_pictures_show_spheres_where_they_are_larger_the_nearer_they_are():
+    box = spheres(2, sides=(0.06, 0.045, 0.02))
+    places = np.array([[0.02, 0.015, _RADIUS], [0.041, 0.0302, 0.0185]])
+    run = SoftRun(
+        positions=np.stack([places, places]),
+        velocities=np.zeros((2, 2, 3)),
+        displacement=np.zeros((2, 2)),
+        collisions=0,
+    )
+    camera = LabCamera(
+        size=(560, 440),
+        scale=8000.0,
+        centre=(281.5, 218.0),
+        floor=(30.0, 30.0, 30.0),
+        beads=((230.0, 230.0, 230.0),),
+        # Evenly lit, and sharp.
+        ambient=1.0,
+        highlight=0.0,
+        shadow=0.0,
+        noise=0.0,
+        vignette=0.0,
+        blur=0.1,
+    )
+    (picture,) = shaded_pictures(run, box, np.zeros(2, dtype=int), camera)
+    bright = picture[..., 0] > 100
+    # The rim is brighter than the floor.
+    left, top = camera.centre - 0.5 * camera.scale * np.array(box.sides[:2])
+    bright[: int(top) + 5], bright[:, : int(left) + 5] = False, False
+    bright[-int(top) - 5 :], bright[:, -int(left) - 5 :] = False, False
+    rows, columns = np.nonzero(bright)
+    for place in places:
+        scale = camera.scale * camera.distance / (camera.distance - place[2])
+        aside = place[:2] - 0.5 * np.array(box.sides[:2])
+        column, row = np.array(camera.centre) + scale * aside
+        own = np.hypot(columns - column, rows - row) < 2.0 * _RADIUS * scale
+        assert columns[own].mean() == pytest.approx(column, abs=0.1)
+        assert rows[own].mean() == pytest.approx(row, abs=0.1)
+        assert np.sqrt(own.sum() / np.pi) == pytest.approx(_RADIUS * scale, rel=0.02)

@@ -48,11 +48,11 @@ if TYPE_CHECKING:
 
 # Change of the vertical speed at a hit over the speed before it: 1 and a restitution.
 _CHANGE = 1.95
-# Share of that which hits take off: beads that roll lose less, and a hit that shows ends a flight.
-# With friction and drag known walls came out right with 0.3 to 0.45 (frictions of 0.01 to 0.1,
-# `benchmarks.drawn_friction`); and its relative spread in the friction rate of the flights.
 ROLLING, SLIDING = 0.4, 1.0
-"""Shares of the full loss that hits take off a bead."""
+"""Shares of the full loss that hits take off: beads that roll lose less, and a hit that shows
+ends a flight. With friction and drag known walls come out right with a quarter to a half
+(`benchmarks.drawn_friction`)."""
+# Relative spread of the share in the friction rate of the flights.
 _SHARE_SPREAD = 0.5
 # Vertical speeds, in steps of a part of their root mean square, and equally likely times of a hit.
 _SPEEDS, _STEP, _PHASES = 10, 0.3, 6

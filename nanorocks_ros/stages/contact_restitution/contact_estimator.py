@@ -105,6 +105,7 @@ class ContactEstimator(RestartingStage[ContactInput, CorEstimate]):
             self._settings.prior,
             cooling.probability,
             height_known=height_known,
+            each_wall=False,
         )
         beads, walls = _interval(alone.beads), _interval(alone.walls)
         is_known = math.isfinite(beads.value) or math.isfinite(walls.value)

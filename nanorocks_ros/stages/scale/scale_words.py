@@ -96,10 +96,12 @@ def _wrong_diameter(beads: Sequence[Ruler], tray: Tray) -> str:
     size = f'{factor:.3f} times as large as given'
     if len(tray.species) == 1:
         size = f'{tray.diameter * factor / _MILLIMETRE:.2f} mm large'
-    light = '; or light them from all sides, if their shaded side does not show'
+    light = ''
+    if factor < 1.0:
+        light = '; or light them from all sides, if their shaded side does not show'
     return (
         f'the scale fits the walls, and beads look {size}: correct diameter_mm of tray '
-        f'{tray.number} in the trays file{light if factor < 1.0 else ""}'
+        f'{tray.number} in the trays file{light}'
     )
 
 

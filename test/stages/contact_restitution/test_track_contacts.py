@@ -194,4 +194,5 @@ def test_walls_that_rub_are_held_and_those_that_do_not_are_as_exact():
     assert np.mean(held) > 0.85
     smooth = [rubbing(0.0, seed).walls.restitution for seed in range(5)]
     assert np.mean([walls.lower < 0.9 < walls.upper for walls in smooth]) > 0.7
-    assert np.mean([walls.upper - walls.lower for walls in smooth]) < 0.01
+    # 0.0043 without friction in the likelihood.
+    assert np.mean([walls.upper - walls.lower for walls in smooth]) < 0.005
