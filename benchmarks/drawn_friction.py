@@ -94,7 +94,12 @@ def report() -> None:
             cells.append(f'{seen.holds:.2f} | {seen.half_width:.4f} | {seen.median_error:+.4f}')
         print(f'| {" | ".join(cells)} |')
     print('\n| tray | drag [1/s] | friction |', end='')
-    print(''.join(f' {share:g} |' for share in SHARES) + '\n' + '| --- ' * (3 + len(SHARES)) + '|')
+    print(
+        ''.join(f' share {share:g} |' for share in SHARES)
+        + '\n'
+        + '| --- ' * (3 + len(SHARES))
+        + '|'
+    )
     for (number, drag, friction), read in by_case.items():
         if friction:
             pulls = np.nanmean([cycle.pulls for cycle in read], axis=0)

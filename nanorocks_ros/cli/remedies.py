@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 # Commands in remedies that describe a tray by its number alone.
-_BY_NUMBER = re.compile(r'nanorocks (?:library|cluster-curve|simulate) --trays? \d+')
+_BY_NUMBER = re.compile(
+    r'nanorocks (?:library|cluster-curve|simulate) --trays? \d+(?!\d| --trays-file)'
+)
 # What describes a recording on the command line: the flag by the name of its value.
 _DESCRIPTION = {
     'trays': '--trays',

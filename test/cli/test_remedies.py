@@ -24,6 +24,8 @@ trays:
 def test_the_trays_file_is_repeated_and_quoted():
     own = with_own_files(TEXT, Namespace(trays_file='my trays.yaml'))
     assert "nanorocks library --tray 3 --trays-file 'my trays.yaml' -o tray_3.npz" in own
+    # Texts that were written into results are said again.
+    assert with_own_files(own, Namespace(trays_file='my trays.yaml')) == own
 
 
 def test_a_recording_and_the_options_that_describe_it_are_repeated():

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 _CHANGE = 1.95
 ROLLING, SLIDING = 0.4, 1.0
 """Shares of the full loss that hits take off: beads that roll lose less, and a hit that shows
-ends a flight. With friction and drag known walls come out right with a quarter to a half
+ends a flight. With friction and drag known walls come out right with 0.2 to 0.6
 (`benchmarks.drawn_friction`)."""
 # Relative spread of the share in the friction rate of the flights.
 _SHARE_SPREAD = 0.5

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 # the time: then such a pixel is as large as one at half this scale. [px/m]
 _FINE = 9000.0
 Correlations = ClusterEstimate | Autocorrelation | Notice
+SIZES_UNKNOWN = 'cluster sizes are unknown'
+"""What every notice about a missing calibration says."""
 _NO_SIZE = SizeEstimate(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, SizeStatus.UNCALIBRATED)
 
 
@@ -196,11 +198,11 @@ def _curve(settings: PipelineSettings, tray: Tray) -> tuple[ClusterCurve | None,
         # Speeds and restitutions do not need the curve; a file named in the settings is required.
         if settings.clusters.curve:
             raise
-        return None, f'{error}; until then cluster sizes are unknown'
+        return None, f'{error}; until then {SIZES_UNKNOWN}'
     level, mix = settings.clusters.level, settings.preprocess.gray_mix
     if level != curve.level or mix != PipelineSettings().preprocess.gray_mix:
         return None, (
-            f'tray {tray.number}: cluster sizes are unknown: they are calibrated for '
+            f'tray {tray.number}: {SIZES_UNKNOWN}: they are calibrated for '
             f'clusters.level {curve.level:g} and the default preprocess.gray_mix'
         )
     return curve, ''

@@ -16,6 +16,7 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
 from nanorocks_ros.pipeline.contact_words import contact_lines, length_unit, motion_line
 from nanorocks_ros.recordings.bag.find_bags import RESULTS_MARK
+from nanorocks_ros.stages.clusters.correlation_width import SIZES_UNKNOWN
 from nanorocks_ros.stages.contact_restitution.track_contacts import track_contacts
 from nanorocks_ros.studies.analysis.bag_tracks import TrackedBag, track_bag
 from nanorocks_ros.studies.analysis.results.tracks_files import write_tracks
@@ -223,9 +224,11 @@ def _decay_lines(plan: MeasurePlan, step: DecayStep, teller: Teller) -> list[str
     except NanorocksError as error:
         return [f'{DECAY_NOT_READ}; {error}']
     said = {line for verdict in step.verdicts for line in verdict.lines()}
+    # Of sizes of clusters nothing is told here.
+    notices = [notice for notice in analysis.notices if SIZES_UNKNOWN not in notice]
     lines = [
         f'{DECAY_PREFIX}{line.strip()}'
-        for line in (*analysis.notices, *tray_lines(analysis, analysis.trays[number]))
+        for line in (*notices, *tray_lines(analysis, analysis.trays[number]))
         if line.strip() not in said
     ]
     write_bytes(note, json.dumps({'key': key, 'lines': lines}).encode())

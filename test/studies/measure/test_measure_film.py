@@ -147,7 +147,11 @@ def test_beads_that_are_not_there_are_said_and_the_exit_code_is_three(film, tmp_
 def test_what_the_decay_says_on_the_way_is_told(tmp_path, capsys):
     bag = Path(__file__).resolve().parents[3] / 'bags/tray_1_sample'
     out = tmp_path / 'out'
-    assert main(['measure', str(bag), '--pixels-per-metre', '12800', '-o', str(out)]) == 0
-    assert 'decay: tray 1: the rulers of the scale disagree' in capsys.readouterr().out
+    wrong = ['--pixels-per-metre', '12800', '--clusters-level', '0.4']
+    assert main(['measure', str(bag), *wrong, '-o', str(out)]) == 0
+    said = capsys.readouterr().out
+    assert 'decay: tray 1: the rulers of the scale disagree' in said
+    # They are not measured here.
+    assert 'cluster sizes' not in said
     lines = json.loads((out / 'measured.json').read_text())['trays']['1']['decay']
     assert any('the rulers of the scale disagree' in line for line in lines)
