@@ -40,6 +40,7 @@ ALL = (
     'contacts_alone',
     'short_films',
     'lab_films',
+    'lit_beads',
     'own_tray',
     'oblique',
     'python_interface',

@@ -110,11 +110,15 @@ class View(NamedTuple):
     voting : Voting
     evidence : float
         Sum over the discs that were learnt from.
+    shifts : tuple of tuples of 4 floats
+        Of beads of each size: largest radius, [px], and what circles are to be moved across and
+        down and their radius by, in radii.
     """
 
     moves: bool
     voting: Voting
     evidence: float
+    shifts: tuple[tuple[float, float, float, float], ...] = ()
 
     def with_step(self, step: float) -> View:
         """The same with another usual step at edges, [gray levels]."""

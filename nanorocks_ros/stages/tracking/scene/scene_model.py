@@ -16,6 +16,7 @@ from nanorocks_ros.stages.tracking.scene.bead_looks import (
 )
 from nanorocks_ros.stages.tracking.scene.floor_behind import CastShadows, darken, left_behind
 from nanorocks_ros.stages.tracking.scene.known_beads import ALIKE, AtRest, KnownBeads
+from nanorocks_ros.stages.tracking.scene.lit_views import LitSizes, in_light, shifted
 from nanorocks_ros.stages.tracking.scene.outlines.disc_measures import (
     apart,
     colours_of,
@@ -84,6 +85,8 @@ class SceneModel:
         Whether discs that move told what beads look like.
     shadows : CastShadows or None
         Those that show as discs.
+    light : LitSizes or None
+        How light shows the beads.
     """
 
     def __init__(self, frames: Sequence[NDArray[np.uint8]], look: BeadLook) -> None:
@@ -93,8 +96,10 @@ class SceneModel:
             self.scale = max(1, math.ceil(_LEAST_RADIUS_PX / math.sqrt(math.prod(look.radii))))
         self._look = look
         self.colours: SceneColours = scene_colours(frames, colour).enlarged(self.scale)
+        self.views: list[View] = []
         self.sees_motion = False
         self.shadows: CastShadows | None = None
+        self.light: LitSizes | None = None
         self._known: KnownBeads | None = None
         self._roamed: RoamedRegion | None = None
         self._at_rest = AtRest()
@@ -107,6 +112,8 @@ class SceneModel:
             self._learn_looks(lesson)
         # Hands, rails and skirting boards may have stronger edges than the beads.
         if self.sees_motion and self._weaken_steps(attended, self._are_known, _MUCH_WEAKER):
+            self._learn_looks(lesson)
+        if self._learn_light(lesson):
             self._learn_looks(lesson)
         if self.colours.knows_background and self.sees_motion:
             moved = self._moved * self.scale
@@ -178,6 +185,32 @@ class SceneModel:
                     self.views[k] = view.with_step(usual)
                     changed = True
         return changed
+
+    def _learn_light(self, frames: Sequence[NDArray[np.uint8]]) -> bool:
+        """Learn where light and shade let the outlines of beads show; returns whether any do."""
+        discs = []
+        for frame in frames:
+            found = self.candidates(frame)
+            good = self.alike(found) & (found.outlines.support >= _GOOD_SUPPORT)
+            if self.sees_motion:
+                good &= found.moving >= MOVING_SHARE
+            discs.append(found.outlines.discs[good])
+        if not sum(len(rows) for rows in discs):
+            return False
+        self.light = LitSizes.of(frames, discs)
+        if not self.light.shift:
+            return False
+        half = np.array([0.5 * (self.scale - 1.0)] * 2 + [0.0])
+        beads = [self.scale * self.light.beads(rows) + half for rows in discs]
+        # A limit lies between the beads as between the discs that show.
+        grown = np.median(np.concatenate(beads)[:, 2]) / np.median(np.concatenate(discs)[:, 2])
+        limits = [float(grown) * limit for limit in self.light.limits]
+        large = [enlarged(frame, self.scale) for frame in frames]
+        self.views = [
+            in_light(view, [view.of(frame, self.colours) for frame in large], beads, limits)
+            for view in self.views
+        ]
+        return True
 
     def _are_known(
         self, color: NDArray[np.uint8], discs: NDArray[np.float64]
@@ -277,7 +310,8 @@ class SceneModel:
     ) -> Outlines:
         """Discs that show in a view, smeared ones where it moves; their steps over the usual."""
         smear = moving if self._known is not None and self.colours.knows_background else None
-        return search_outlines(view.of(color, self.colours), view.voting, hints, smear)
+        found = search_outlines(view.of(color, self.colours), view.voting, hints, smear)
+        return shifted(found, view)
 
     def _learn(self, frames: Sequence[NDArray[np.uint8]]) -> None:
         chosen = [

@@ -42,6 +42,9 @@ class Voting(NamedTuple):
         Usual step of the picture at the edge of a disc.
     noise : float
         Of a pixel.
+    outline : tuple of floats, (RAYS,)
+        Where light and shade let the outline of a bead show on each ray, in radii; none: on the
+        circle.
     """
 
     smallest: float
@@ -49,6 +52,7 @@ class Voting(NamedTuple):
     sign: int
     step: float
     noise: float
+    outline: tuple[float, ...] = ()
 
 
 def centres_of_all_sizes(

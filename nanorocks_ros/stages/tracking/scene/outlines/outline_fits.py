@@ -110,6 +110,8 @@ def _fitted(
         [np.cos(angles), np.sin(angles), np.ones(RAYS), np.cos(2 * angles), np.sin(2 * angles)],
         axis=1,
     )
+    if voting.outline:
+        shape[:, 2] = voting.outline
     search = Search(
         voting.sign,
         max(_LEAST_STEP * voting.step, _LEAST_NOISES * voting.noise),

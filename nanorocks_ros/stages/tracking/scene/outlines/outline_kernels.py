@@ -46,8 +46,8 @@ class Search(NamedTuple):
     smallest, largest : float, [px]
         Radii.
     shape : ndarray (RAYS, n)
-        Cosine and sine of each ray, 1, and of smeared discs cosine and sine of twice its angle:
-        the outline is a sum of these.
+        Cosine and sine of each ray, where the outline of a circle of radius 1 shows on it, and of
+        smeared discs cosine and sine of twice its angle: the outline is a sum of these.
     """
 
     sign: int
@@ -121,7 +121,7 @@ def fit_each(
             samples = math.ceil(2.0 * half_width / _SAMPLE_PX) + 3
             samples = min(_MAX_SAMPLES[turn], samples)
             for ray in range(RAYS):
-                middle = results[k, 2]
+                middle = results[k, 2] * search.shape[ray, 2]
                 for term in range(3, terms):
                     middle += work.fitted[term] * search.shape[ray, term]
                 _edge(picture, results, k, search, ray, middle, half_width, samples, work)
@@ -326,15 +326,16 @@ def _sum_up(shape: NDArray[np.float64], work: Scratch, ridge: float) -> None:
             continue
         across, down, distance = shape[ray, 0], shape[ray, 1], work.edges[ray, 0]
         part_x, part_y = weight * across, weight * down
+        part_radius = weight * shape[ray, 2]
         xx += part_x * across
         yx += part_y * across
         yy += part_y * down
-        x += part_x
-        y += part_y
-        count += weight
+        x += part_radius * across
+        y += part_radius * down
+        count += part_radius * shape[ray, 2]
         right_x += part_x * distance
         right_y += part_y * distance
-        right_radius += weight * distance
+        right_radius += part_radius * distance
         for i in range(3, terms):
             part = weight * shape[ray, i]
             right[i] += part * distance
