@@ -12,11 +12,11 @@ MAKEFLAGS += --no-print-directory
 # as wheels, and nothing of another ROS may leak in.
 ifeq ($(ROS_DISTRO),jazzy)
 VENV := .venv-jazzy
-SET_UP := $(VENV) requirements/jazzy.txt system
+SET_UP := $(VENV) requirements/jazzy.txt system compile
 AMENT := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 else
 VENV := .venv
-SET_UP := $(VENV) requirements/wheels.txt
+SET_UP := $(VENV) requirements/wheels.txt own compile
 AMENT := $(CURDIR)/$(VENV)
 unexport PYTHONPATH
 endif
@@ -111,7 +111,7 @@ docs-pages: venv ## Renew the pages of docs/ that are made from the code (minute
 site: venv ## Build the documentation into build/site, with search
 	@$(RUN) python -m nanorocks_ros.tools.docs_pages.site
 
-venv: ## Set up the environment that all of these use
+venv: ## Set up the environment that all of these use, with its functions compiled
 	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \
 	    echo 'ROS 2 $(ROS_DISTRO) is sourced: use a shell without ROS, or with Jazzy' >&2; exit 1; \
 	esac

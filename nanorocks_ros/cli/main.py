@@ -56,6 +56,7 @@ COMMANDS = {
     'look after the machine': {
         'dashboard': 'live_page',
         'doctor': 'doctor',
+        'compile': 'compile_functions',
         'completion': 'parsing.completion',
     },
 }
