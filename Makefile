@@ -8,15 +8,19 @@
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 
+# Functions are compiled at the installation, so that no first start does so; in CI by the tests,
+# each where it is first called.
+COMPILE_NOW := $(if $(filter true,$(CI)),,compile)
+
 # With ROS 2 Jazzy sourced that one is used, from an environment of its own; otherwise Jazzy comes
 # as wheels, and nothing of another ROS may leak in.
 ifeq ($(ROS_DISTRO),jazzy)
 VENV := .venv-jazzy
-SET_UP := $(VENV) requirements/jazzy.txt system compile
+SET_UP := $(VENV) requirements/jazzy.txt system $(COMPILE_NOW)
 AMENT := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 else
 VENV := .venv
-SET_UP := $(VENV) requirements/wheels.txt own compile
+SET_UP := $(VENV) requirements/wheels.txt own $(COMPILE_NOW)
 AMENT := $(CURDIR)/$(VENV)
 unexport PYTHONPATH
 endif

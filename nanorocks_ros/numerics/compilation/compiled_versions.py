@@ -20,7 +20,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from numba.core import types
+from numba.core import types as numba_types
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
@@ -28,6 +28,10 @@ from nanorocks_ros.numerics.compilation.kernel_cache import cache_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+
+# Without types, or with some of them.
+types: Any = numba_types
+_Dispatcher: Any = Dispatcher
 
 _PACKAGE = 'nanorocks_ros'
 _ARRAY = re.compile(r'(\w+)\[(\d+)([ACF])(,const)?\]')
@@ -139,7 +143,7 @@ def _functions(modules: Iterable[str]) -> Iterator[tuple[str, Any]]:
         if module_name.partition('.')[0] != _PACKAGE:
             continue
         for name, value in list(vars(sys.modules[module_name]).items()):
-            if not isinstance(value, Dispatcher) or isinstance(value._cache, NullCache):
+            if not isinstance(value, _Dispatcher) or isinstance(value._cache, NullCache):
                 continue
             if value.py_func.__module__ == module_name:
                 yield name, value

@@ -99,7 +99,8 @@ def compile_versions(
     for version in versions:
         name = f'{version.module}.{version.function}'
         tasks[name] = (*tasks.get(name, ()), str(version))
-    done, spent, faults = 0, 0.0, []
+    done, spent = 0, 0.0
+    faults: list[str] = []
     with closing(run_in_processes(_compile_all, tasks, min(processes, len(tasks)))) as results:
         for name, result in results:
             done += len(tasks[name])
