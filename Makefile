@@ -33,7 +33,8 @@ RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-nodes test-oldest test-oldest-meanwhile dependencies-oldest \
-        test-package golden lint bench docs docs-pages site venv messages lock clean
+        test-package golden lint bench functions docs docs-pages site venv messages lock \
+        clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -75,7 +76,7 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py \
         test/test_contributing.py test/test_docs_code.py test/test_printed_numbers.py \
         test/test_tutorial.py test/test_gallery.py test/interface test/studies/measure \
-        test/cli/films test/studies/gas_statistics test/tools/docs_pages \
+        test/cli/films test/studies/gas_statistics test/tools/docs_pages test/tools/compilation \
         test/studies/figures/test_demo_figure.py test/studies/inspection \
         test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
         test/cli/test_interrupts.py test/test_docs.py test/test_external_links.py \
@@ -105,6 +106,9 @@ lint: venv ## Check style, format, types and which module may import which
 
 bench: venv ## Measure against the limits and against peers
 	@$(RUN) python -m benchmarks
+
+functions: venv ## Renew the list of functions that are compiled at an installation (minutes)
+	@$(RUN) python -m nanorocks_ros.tools.compilation.function_list
 
 docs: docs-pages site ## Renew the generated pages of docs/, and build the site
 
