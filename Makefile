@@ -8,15 +8,19 @@
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 
+# Functions are compiled at the installation, so that no first start does so; in CI by the tests,
+# each where it is first called.
+COMPILE_NOW := $(if $(filter true,$(CI)),,compile)
+
 # With ROS 2 Jazzy sourced that one is used, from an environment of its own; otherwise Jazzy comes
 # as wheels, and nothing of another ROS may leak in.
 ifeq ($(ROS_DISTRO),jazzy)
 VENV := .venv-jazzy
-SET_UP := $(VENV) requirements/jazzy.txt system
+SET_UP := $(VENV) requirements/jazzy.txt system $(COMPILE_NOW)
 AMENT := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 else
 VENV := .venv
-SET_UP := $(VENV) requirements/wheels.txt
+SET_UP := $(VENV) requirements/wheels.txt own $(COMPILE_NOW)
 AMENT := $(CURDIR)/$(VENV)
 unexport PYTHONPATH
 endif
@@ -29,7 +33,8 @@ RUN := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" AMENT_PREFIX_PATH="$(AMENT)" \
        ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-nodes test-oldest test-oldest-meanwhile dependencies-oldest \
-        test-package golden lint bench docs docs-pages site venv messages lock clean
+        test-package golden lint bench functions docs docs-pages site venv messages lock \
+        clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' $(MAKEFILE_LIST) | \
@@ -71,7 +76,7 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/cli/figures/test_figure_cor.py test/cli/simulation/test_simulate_scene.py \
         test/test_contributing.py test/test_docs_code.py test/test_printed_numbers.py \
         test/test_tutorial.py test/test_gallery.py test/interface test/studies/measure \
-        test/cli/films test/studies/gas_statistics test/tools/docs_pages \
+        test/cli/films test/studies/gas_statistics test/tools/docs_pages test/tools/compilation \
         test/studies/figures/test_demo_figure.py test/studies/inspection \
         test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
         test/cli/test_interrupts.py test/test_docs.py test/test_external_links.py \
@@ -102,6 +107,9 @@ lint: venv ## Check style, format, types and which module may import which
 bench: venv ## Measure against the limits and against peers
 	@$(RUN) python -m benchmarks
 
+functions: venv ## Renew the list of functions that are compiled at an installation (minutes)
+	@$(RUN) python -m nanorocks_ros.tools.compilation.function_list
+
 docs: docs-pages site ## Renew the generated pages of docs/, and build the site
 
 docs-pages: venv ## Renew the pages of docs/ that are made from the code (minutes)
@@ -111,7 +119,7 @@ docs-pages: venv ## Renew the pages of docs/ that are made from the code (minute
 site: venv ## Build the documentation into build/site, with search
 	@$(RUN) python -m nanorocks_ros.tools.docs_pages.site
 
-venv: ## Set up the environment that all of these use
+venv: ## Set up the environment that all of these use, with its functions compiled
 	@case '$(ROS_DISTRO)' in ''|jazzy) ;; *) \
 	    echo 'ROS 2 $(ROS_DISTRO) is sourced: use a shell without ROS, or with Jazzy' >&2; exit 1; \
 	esac

@@ -2,10 +2,11 @@
 # Makes a virtual environment as a lock file says and installs this package into it; returns at
 # once when there is nothing to do. `make` calls it:
 #
-#   sh requirements/set_up.sh FOLDER LOCK [own|system] [dependencies]
+#   sh requirements/set_up.sh FOLDER LOCK [own|system] [dependencies|compile]
 #
 # `system` lets the environment see the Python packages of the ROS 2 that is sourced; with
-# `dependencies` this package is not installed yet, which two calls must not do at a time.
+# `dependencies` this package is not installed yet, which two calls must not do at a time; with
+# `compile` its functions are compiled after an installation, so that no first start does so.
 # $PYTHON names the interpreter; without it the first that runs and is new enough is taken.
 set -eu
 unset _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONHOME
@@ -123,4 +124,9 @@ if [ "$(stored package)" != "$wanted" ] || [ ! -d "$folder/lib/nanorocks_ros" ];
     echo "$folder: installing nanorocks_ros"
     logged 'install nanorocks_ros' pip_install --no-deps --editable .
     echo "$wanted" >"$folder/package"
+    if [ "${4:-}" = compile ]; then
+        echo "$folder: compiling functions, on all cores (a minute; once for this state of the code)"
+        # Whatever is not compiled now is at its first use.
+        "$folder/bin/nanorocks" compile || true
+    fi
 fi

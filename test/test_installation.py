@@ -155,6 +155,25 @@ def test_an_environment_is_made_with_hashes_alone():
     assert '--generate-hashes' in makefile
 
 
+@pytest.mark.parametrize('ros', ['', 'jazzy'])
+def test_an_installation_compiles_functions_but_not_in_ci(ros):
+    calls = {}
+    for ci in ('', 'true'):
+        environment = {**os.environ, 'CI': ci, 'ROS_DISTRO': ros}
+        made = subprocess.run(
+            ['make', '--dry-run', 'venv'],
+            cwd=ROOT,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        assert made.returncode == 0, made.stderr
+        calls[ci] = made.stdout.splitlines()[-1].split()
+    assert calls[''] == [*calls['true'], 'compile']
+    script = (ROOT / 'requirements' / 'set_up.sh').read_text()
+    assert '"$folder/bin/nanorocks" compile' in script
+
+
 def test_requirements_of_every_day_are_no_extras():
     requires = importlib.metadata.requires('nanorocks_ros')
     if not any(line.startswith('shtab') for line in requires):
