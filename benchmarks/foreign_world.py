@@ -22,6 +22,7 @@ from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measur
 from benchmarks.film_measurement import DECADES, FilmResult, is_flagged
 from benchmarks.film_truth import FilmTruth
 from nanorocks_ros.records import CorStatus, Quality
+from nanorocks_ros.settings import PriorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,6 +39,8 @@ _HALF_WIDTHS = 3.0
 _SIGMAS = 1.96
 # Parts of a posterior below the limits of its intervals of 95 and 68 %, and its median.
 _QUANTILES = (0.0, 0.025, 0.16, 0.5, 0.84, 0.975, 1.0)
+# Systematic errors of a film that are compared.
+_SYSTEMATIC = np.arange(0.0002, 0.05, 0.0002)
 # Factor within which stated errors count as right.
 _FACTOR = 1.5
 
@@ -142,11 +145,16 @@ def _rank_cells(films: list[ReadFilm], truth: str, field: str) -> str:
 
 
 def print_contacts(read: list[ReadFilm]) -> None:
-    """Print errors of what collisions say over the stated ones, tray by tray and of all."""
+    """Print errors of what collisions say over the stated ones, tray by tray and of all.
+
+    The last column tells which systematic error of a film, normally distributed from film to film,
+    fits best beside the errors that collisions tell, and which fits less by 2 in the logarithm.
+    """
     print(
-        '| tray | films | collisions | mean error over stated | root mean square | weighted bias |'
+        '| tray | films | collisions | mean error over stated | root mean square | covered 68 % '
+        '| weighted bias | systematic error of a film: best, at most |'
     )
-    print('| --- ' * 6 + '|')
+    print('| --- ' * 8 + '|')
     by_tray = {str(tray): films for tray, films in _by_tray(read).items()}
     for name, films in [*by_tray.items(), ('all', read)]:
         print(_contact_row(name, films))
@@ -164,13 +172,23 @@ def _contact_row(name: str, films: list[ReadFilm]) -> str:
             errors.append(value - read_film.film.beads)
             stated.append(0.5 * (upper - lower) / _SIGMAS)
     if not errors:
-        return f'| {name} | 0 ' + '| ' * 4 + '|'
+        return f'| {name} | 0 ' + '| ' * 6 + '|'
     ratios, weights = np.divide(errors, stated), np.power(stated, -2.0)
     return (
         f'| {name} | {len(errors)} | {collisions} | {ratios.mean():+.2f} '
-        f'| {math.sqrt(np.mean(ratios**2)):.2f} '
-        f'| {np.average(errors, weights=weights):+.4f} ± {weights.sum() ** -0.5:.4f} |'
+        f'| {math.sqrt(np.mean(ratios**2)):.2f} | {np.mean(np.abs(ratios) < 1.0):.2f} '
+        f'| {np.average(errors, weights=weights):+.4f} ± {weights.sum() ** -0.5:.4f} '
+        f'| {_systematic_cell(np.array(errors), np.array(stated))} |'
     )
+
+
+def _systematic_cell(errors: NDArray[np.float64], stated: NDArray[np.float64]) -> str:
+    """The systematic error that fits best, and that whose log likelihood is lower by 2."""
+    of_collisions = np.maximum(stated**2 - PriorSettings().collision_bias ** 2, 0.0)
+    variances = of_collisions + _SYSTEMATIC[:, np.newaxis] ** 2
+    logs = -0.5 * np.sum(errors**2 / variances + np.log(variances), axis=1)
+    allowed = _SYSTEMATIC[logs > logs.max() - 2.0]
+    return f'{_SYSTEMATIC[logs.argmax()]:.4f}, {allowed.max():.4f}'
 
 
 def _by_tray(read: list[ReadFilm]) -> dict[int, list[ReadFilm]]:

@@ -209,7 +209,7 @@ class PriorSettings:
         high=100.0,
     )
     collision_bias: float = setting(
-        0.008,
+        0.004,
         'standard deviation of the common systematic error of the bead restitutions measured from '
         'collisions',
         low=0.0,
