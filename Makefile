@@ -80,7 +80,9 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/studies/figures/test_demo_figure.py test/studies/inspection \
         test/dashboard/test_page_views.py test/cli/test_bag_settings.py \
         test/cli/test_interrupts.py test/test_docs.py test/test_external_links.py \
-        test/test_mirror.py test/test_validation_tables.py test/test_installation.py
+        test/test_mirror.py test/test_validation_tables.py test/test_installation.py \
+        test/physics/test_paper_numbers.py test/studies/synthetic/test_trajectory.py \
+        test/studies/synthetic/test_simulated_runs.py
 
 # Beside `make venv`, see .ci/run.
 dependencies-oldest:

@@ -44,7 +44,7 @@ assert counter.count == 0, f'{counter.count} functions were compiled'
 """
 _IMPORT = 'import nanorocks_ros.studies.analysis.offline_analysis'
 _BY_NUMBA, _LEAN = _ANALYSE.format(by_numba=True), _ANALYSE.format(by_numba=False)
-_FIRST, _FIRST_BY_NUMBA = 'first, nothing compiled before', 'the same, compiled by numba alone'
+_FIRST, _FIRST_BY_NUMBA = 'first, nothing compiled before', 'first, compiled by numba alone'
 # Rows of the report: name, what is run, folder, goal [s].
 _STARTS = (
     (_FIRST_BY_NUMBA, _BY_NUMBA, 'numba', None),
