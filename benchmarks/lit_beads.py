@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from benchmarks.shaded_film import EXPOSURES, LabCamera, _Shading, write_shaded_film
+from benchmarks.shaded_film import EXPOSURES, LabCamera, Shading, write_shaded_film
 from benchmarks.soft_spheres import SoftBox, SoftRun
 from nanorocks_ros.stages.tracking.scene.bead_looks import BeadLook
 from nanorocks_ros.stages.tracking.scene.scene_model import scene_model
@@ -177,7 +177,7 @@ def drawn(scene: Scene, seed: int) -> tuple[list[np.ndarray], list[np.ndarray], 
         write_shaded_film(path, run, box, species, camera)
         film = cv2.VideoCapture(str(path))
         frames = [film.read()[1] for _ in range(_FRAMES)]
-    seen, scales = _Shading(box, species, camera)._seen(places)
+    seen, scales = Shading(box, species, camera).seen(places)
     truths = [
         np.column_stack([centres, radius * own]) for centres, own in zip(seen, scales, strict=True)
     ]

@@ -104,13 +104,13 @@ def shaded_pictures(
     run: SoftRun, box: SoftBox, species: np.ndarray, camera: LabCamera
 ) -> Iterator[np.ndarray]:
     """Pictures of a run, uint8 (rows, columns, 3), bgr."""
-    picture = _Shading(box, species, camera)
+    picture = Shading(box, species, camera)
     for first in range(0, len(run.positions) - EXPOSURES + 1, EXPOSURES):
         states = range(first, first + EXPOSURES)
         yield picture.exposed([(run.positions[k], run.displacement[k]) for k in states])
 
 
-class _Shading:
+class Shading:
     """Draws the states of a run."""
 
     def __init__(self, box: SoftBox, species: np.ndarray, camera: LabCamera) -> None:
@@ -144,7 +144,7 @@ class _Shading:
         smooth = cv2.GaussianBlur(noise, (0, 0), size)
         return smooth / smooth.std()
 
-    def _seen(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def seen(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Columns and rows of places (..., 3), [px], and the scale there (...), [px/m]."""
         camera = self._camera
         scales = camera.scale * camera.distance / (camera.distance - places[..., 2])
@@ -178,7 +178,7 @@ class _Shading:
         """Corners of the box, (4, 2), [px]."""
         width, length, _ = self._box.sides
         corners = np.array([[0, 0], [width, 0], [width, length], [0, length]]) + displacement
-        return self._seen(np.column_stack([corners, np.full(4, height)]))[0]
+        return self.seen(np.column_stack([corners, np.full(4, height)]))[0]
 
     def _around(self, centre: np.ndarray, reach: float) -> tuple[slice, slice] | None:
         """Rows and columns up to so far from a place; None outside the picture."""
@@ -193,7 +193,7 @@ class _Shading:
         for place, radius in zip(places, self._box.radii, strict=True):
             slope = self._light[:2] / self._light[2]
             foot = np.array([*(place[:2] - slope * place[2]), 0.0])
-            centre, scale = self._seen(foot)
+            centre, scale = self.seen(foot)
             soft = 1.0 + 0.15 * place[2] * scale
             part = self._around(centre, radius * scale + 6.0 * soft)
             if part:
@@ -206,7 +206,7 @@ class _Shading:
         self, image: np.ndarray, place: np.ndarray, radius: float, species: int
     ) -> None:
         camera = self._camera
-        centre, scale = self._seen(place)
+        centre, scale = self.seen(place)
         size = radius * scale
         part = self._around(centre, size + 1.0)
         if part is None:
