@@ -10,7 +10,6 @@ the light and across it, in radii.
 from __future__ import annotations
 
 import math
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -68,8 +67,8 @@ SCENES = (
 )
 
 
-class Offs(NamedTuple):
-    """Beads, discs, and of those that are right the offs, in radii: (n, 3).
+class Errors(NamedTuple):
+    """Beads, discs, and of those that are right the errors, in radii: (n, 3).
 
     Columns: towards the light, across it, radius.
     """
@@ -86,14 +85,12 @@ def report() -> None:
         '| scatter of radii |'
     )
     print(f'{"| --- " * 8}|')
-    names = sys.argv[2:]
     for scene in SCENES:
-        if not names or scene.name in names:
-            print(_row(scene), flush=True)
+        print(_row(scene), flush=True)
 
 
 def _row(scene: Scene) -> str:
-    parts = [offs(scene, seed) for seed in _SEEDS]
+    parts = [errors(scene, seed) for seed in _SEEDS]
     right = np.concatenate([part.right for part in parts])
     beads, discs = (sum(part[k] for part in parts) for k in (0, 1))
     middle = np.median(right, axis=0)
@@ -111,8 +108,8 @@ def _row(scene: Scene) -> str:
     return f'| {" | ".join(cells)} |'
 
 
-def offs(scene: Scene, seed: int) -> Offs:
-    """What is seen of a scene."""
+def errors(scene: Scene, seed: int) -> Errors:
+    """How wrong is what is seen of a scene."""
     frames, truths, camera = drawn(scene, seed)
     radii = (1.0 - _TOLD) * scene.radius, (1.0 + _TOLD) * scene.radius
     model = scene_model(frames[:: _FRAMES // _LEARNING_FRAMES], BeadLook(radii=radii, apart=1.0))
@@ -123,7 +120,7 @@ def offs(scene: Scene, seed: int) -> Offs:
         seen = candidates.outlines.discs[model.alike(candidates)]
         beads, discs = beads + len(truth), discs + len(seen)
         rows.append(_right(seen, truth, camera.light))
-    return Offs(beads, discs, np.concatenate(rows))
+    return Errors(beads, discs, np.concatenate(rows))
 
 
 def _right(seen: np.ndarray, truth: np.ndarray, light: tuple[float, float, float]) -> np.ndarray:
@@ -193,7 +190,3 @@ def _places(box: SoftBox, random: np.random.Generator) -> np.ndarray:
         if all(np.linalg.norm(place[:2] - other[:2]) > 1.9 * radius for other in places):
             places.append(place)
     return np.array(places)
-
-
-if __name__ == '__main__':
-    report()

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-import time
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.notices import tell
+from nanorocks_ros.cli.progress_bar import Progress
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Iterator
 
 _EXIT_FAULTS = 1
-# Without a terminal a line says this often how far it is, [s].
-_REPEAT_S = 10.0
 
 
 def add_parser(commands: Any) -> None:
@@ -49,9 +44,9 @@ def run(options: argparse.Namespace) -> int:
     missing = missing_versions(listed)
     made = Compilation(functions=0, seconds=0.0, processor_seconds=0.0, faults=())
     if missing:
-        with _progress(len(missing)) as progress:
+        with Progress('compiling functions') as progress:
             try:
-                made = compile_versions(missing, processes, progress)
+                made = compile_versions(missing, processes, progress.count)
             except KeyboardInterrupt:
                 left = len(missing_versions(missing))
                 raise KeyboardInterrupt(
@@ -79,27 +74,3 @@ def run(options: argparse.Namespace) -> int:
     for fault in made.faults:
         tell(f'{fault}; it is compiled when it is first used')
     return _EXIT_FAULTS if made.faults else 0
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[int, str], None]]:
-    """Show how many functions are compiled, and the last: one line on a terminal, else a few."""
-    told_at = time.monotonic()
-    terminal = sys.stderr.isatty()
-
-    def show(done: int, name: str) -> None:
-        nonlocal told_at
-        line = f'{done} of {total} functions compiled, last {name}'
-        if terminal:
-            print(f'\r\x1b[Knanorocks: {line}', end='', file=sys.stderr, flush=True)
-        elif time.monotonic() - told_at > _REPEAT_S:
-            told_at = time.monotonic()
-            tell(line)
-
-    if terminal:
-        show(0, 'none')
-    try:
-        yield show
-    finally:
-        if terminal:
-            print('\r\x1b[K', end='', file=sys.stderr, flush=True)

@@ -120,11 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _set_up() -> None:
-    import gc
     import logging
 
-    # Modules make many objects, and most stay: looking for garbage at every 700th takes 0.1 s.
-    gc.set_threshold(50_000)
     # Set before numpy is loaded: arrays here are too small for a second thread.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     # Progress messages of the package; of other packages only warnings.

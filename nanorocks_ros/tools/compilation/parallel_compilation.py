@@ -77,7 +77,7 @@ class Compilation:
 def compile_versions(
     versions: Sequence[CompiledVersion],
     processes: int,
-    progress: Callable[[int, str], object],
+    progress: Callable[[int, int], object],
 ) -> Compilation:
     """Compile versions of functions, and keep them on disk.
 
@@ -87,7 +87,7 @@ def compile_versions(
         They are begun in this order; the versions of a function together.
     processes : int, > 0
     progress : callable
-        Called with the number of versions that are done, and the name of the last function.
+        Called with the number of versions that are done, and of all.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def compile_versions(
             done += len(tasks[name])
             spent += result.seconds
             faults += result.faults
-            progress(done, name.rpartition('.')[2])
+            progress(done, len(versions))
     return Compilation(
         functions=done - len(faults),
         seconds=time.perf_counter() - start,

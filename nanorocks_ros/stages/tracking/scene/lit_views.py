@@ -69,7 +69,7 @@ class LitSizes(NamedTuple):
         return cls(tuple(limits), tuple(spheres))
 
     @property
-    def shift(self) -> bool:
+    def shifts(self) -> bool:
         """Whether light shifts the discs of any size."""
         return any(sphere is not None and sphere.shifts for sphere in self.spheres)
 

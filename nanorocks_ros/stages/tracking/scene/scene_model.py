@@ -198,7 +198,7 @@ class SceneModel:
         if not sum(len(rows) for rows in discs):
             return False
         self.light = LitSizes.of(frames, discs)
-        if not self.light.shift:
+        if not self.light.shifts:
             return False
         half = np.array([0.5 * (self.scale - 1.0)] * 2 + [0.0])
         beads = [self.scale * self.light.beads(rows) + half for rows in discs]

@@ -117,7 +117,7 @@ def test_a_dark_side_as_dark_as_the_floor_is_no_outline():
 def test_dark_beads_on_a_bright_floor_are_left_as_they_are():
     frames, truths = lit_film((0.5, -0.2, 0.8), floor=0.85 * BEAD, bead=0.3 * BEAD)
     model = learnt(frames)
-    assert not model.light.shift
+    assert not model.light.shifts
     assert all(view.voting.outline == () for view in model.views)
     away, _ = off(frames, truths, model)
     assert np.abs(away).max() < 0.01
@@ -126,7 +126,7 @@ def test_dark_beads_on_a_bright_floor_are_left_as_they_are():
 def test_flat_discs_are_left_as_they_are():
     frames, truths = lit_film((0.0, 0.0, 1.0), ambient=1.0)
     model = learnt(frames)
-    assert not model.light.shift
+    assert not model.light.shifts
     away, _ = off(frames, truths, model)
     assert np.abs(away).max() < 0.02
 
