@@ -24,13 +24,13 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_likelihood import marginal
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
-from nanorocks_ros.inference.contacts.rubbed_rebounds import rubbed_table
+from nanorocks_ros.inference.contacts.rubbed_rebounds import ROLLING, rubbed_table
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
 from nanorocks_ros.inference.decay.friction_weights import friction_weights
 from nanorocks_ros.inference.flights.flight_losses import flight_losses, flight_table
-from nanorocks_ros.inference.likelihood_1d import Likelihood1D
+from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
 from nanorocks_ros.inference.restitution_sources import restitution_sources
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.records import NS, FreeFlight, Headline, Interval, Measured
@@ -61,12 +61,15 @@ class DrawnCycle:
     from_contacts : bool
     pulls : tuple of float
         Error of the walls over the stated one for each of `SHARES`, with friction and drag known.
+    known : float
+        Half of the 95 % interval of the walls by rebounds, with friction and drag known.
     """
 
     beads: Interval
     walls: Interval
     from_contacts: bool
     pulls: tuple[float, ...]
+    known: float
 
 
 def report() -> None:
@@ -93,18 +96,23 @@ def report() -> None:
             seen = coverage([getattr(cycle, name) for cycle in read], 0.0)
             cells.append(f'{seen.holds:.2f} | {seen.half_width:.4f} | {seen.median_error:+.4f}')
         print(f'| {" | ".join(cells)} |')
-    print('\n| tray | drag [1/s] | friction |', end='')
+    print('\n| tray | drag [1/s] | friction | known | over ideal |', end='')
     print(
         ''.join(f' share {share:g} |' for share in SHARES)
         + '\n'
-        + '| --- ' * (3 + len(SHARES))
+        + '| --- ' * (5 + len(SHARES))
         + '|'
     )
     for (number, drag, friction), read in by_case.items():
-        if friction:
-            pulls = np.nanmean([cycle.pulls for cycle in read], axis=0)
-            cells = ' | '.join(f'{pull:+.2f}' for pull in pulls)
-            print(f'| {number} | {drag:g} | {friction:g} | {cells} |')
+        known, ideal = (
+            np.nanmedian([cycle.known for cycle in same])
+            for same in (read, by_case[(number, *ROWS[0])])
+        )
+        pulls = np.nanmean([cycle.pulls for cycle in read], axis=0)
+        cells = ' | '.join(f'{pull:+.2f}' for pull in pulls)
+        print(
+            f'| {number} | {drag:g} | {friction:g} | {known:.4f} | {known / ideal:.2f} | {cells} |'
+        )
 
 
 def _cycle_of(task: tuple[int, int, float, float]) -> DrawnCycle:
@@ -158,25 +166,25 @@ def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCyc
             sources.intervals(_ENDS), ('restitution', 'wall_restitution'), strict=True
         )
     ]
+    truth = float(values['wall_restitution'])
+    told = terms.rebounds >= _FEWEST
+    shared = [_walls(terms, (drag, friction), share) for share in SHARES if told]
+    rolling = _walls(terms, (drag, friction), ROLLING) if told else None
     return DrawnCycle(
         beads=errors[0],
         walls=errors[1],
         from_contacts=sources.headline is Headline.CONTACTS,
-        pulls=_pulls(terms, (drag, friction), float(values['wall_restitution'])),
+        pulls=tuple((walls.mean - truth) / walls.deviation for walls in shared)
+        or (math.nan,) * len(SHARES),
+        known=0.5 * float(np.ptp(rolling.quantiles(_ENDS))) if rolling else math.nan,
     )
 
 
-def _pulls(terms: ContactTerms, known: tuple[float, float], truth: float) -> tuple[float, ...]:
-    """Error of the walls over the stated one, by shares of what hits take off."""
-    if terms.rebounds < _FEWEST:
-        return (math.nan,) * len(SHARES)
+def _walls(terms: ContactTerms, known: tuple[float, float], share: float) -> Posterior1D:
+    """What rebounds tell of the walls with drag and friction known."""
     drag, friction = known
-    pulls = []
-    for share in SHARES:
-        hits, drags = np.array([share * friction]), np.array([drag])
-        table = rubbed_table(terms.rebound_impacts, _WALLS, hits, drags)
-        logs = marginal(table.reshape(-1, _WALLS.size))
-        likelihood = Likelihood1D(restitution=_WALLS, log_likelihood=logs)
-        posterior = likelihood.convolved(_PRIOR.rebound_bias).posterior((0.5, 1.0))
-        pulls.append((posterior.mean - truth) / posterior.deviation)
-    return tuple(pulls)
+    hits, drags = np.array([share * friction]), np.array([drag])
+    table = rubbed_table(terms.rebound_impacts, _WALLS, hits, drags)
+    logs = marginal(table.reshape(-1, _WALLS.size))
+    likelihood = Likelihood1D(restitution=_WALLS, log_likelihood=logs)
+    return likelihood.convolved(_PRIOR.rebound_bias).posterior((0.5, 1.0))

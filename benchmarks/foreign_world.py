@@ -13,7 +13,7 @@ import math
 import os
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.stats import chisquare
@@ -86,7 +86,7 @@ def print_drawn(read: list[ReadFilm]) -> None:
     print_restitutions(read)
     print('\nDrawn films: truths between the quantiles of the posterior\n')
     print_ranks(read)
-    print('\nDrawn films: restitution of beads by contacts alone, in flagged films, too\n')
+    print('\nDrawn films: restitutions by contacts alone, in flagged films, too\n')
     print_contacts(read)
     print('\nDrawn films: measured over true; speeds by true mean projected speed in mm/s\n')
     groups = ' | '.join(f'{1e3 * low:g} to {1e3 * high:g}' for low, high in pairwise(DECADES))
@@ -145,47 +145,69 @@ def _rank_cells(films: list[ReadFilm], truth: str, field: str) -> str:
 
 
 def print_contacts(read: list[ReadFilm]) -> None:
-    """Print errors of what collisions say over the stated ones, tray by tray and of all.
+    """Print errors of what contacts say over the stated ones, tray by tray and of all.
 
     The last column tells which systematic error of a film, normally distributed from film to film,
-    fits best beside the errors that collisions tell, and which fits less by 2 in the logarithm.
+    fits best beside the errors that contacts tell, and which fits less by 2 in the logarithm.
     """
     print(
-        '| tray | films | collisions | mean error over stated | root mean square | covered 68 % '
-        '| weighted bias | systematic error of a film: best, at most |'
+        '| tray | of | films | contacts | mean error over stated | root mean square '
+        '| covered 68 % | weighted bias | systematic error of a film: best, at most |'
     )
-    print('| --- ' * 8 + '|')
+    print('| --- ' * 9 + '|')
+    prior = PriorSettings()
     by_tray = {str(tray): films for tray, films in _by_tray(read).items()}
-    for name, films in [*by_tray.items(), ('all', read)]:
-        print(_contact_row(name, films))
+    for kind in (
+        _Contacts('beads', 'contact_restitution', 'collisions', prior.collision_bias),
+        _Contacts('walls', 'contact_wall_restitution', 'rebounds', prior.rebound_bias),
+    ):
+        for name, films in [*by_tray.items(), ('all', read)]:
+            print(f'| {name} | {kind.truth} {_contact_cells(kind, films)}|')
 
 
-def _contact_row(name: str, films: list[ReadFilm]) -> str:
-    collisions, errors, stated = 0, [], []
+class _Contacts(NamedTuple):
+    """Contacts of a kind: names of the truth, of the interval and of their number; stated bias."""
+
+    truth: str
+    interval: str
+    number: str
+    bias: float
+
+
+def _contact_cells(kind: _Contacts, films: list[ReadFilm]) -> str:
+    contacts, truths, wide, narrow = 0, [], [], []
     for read_film in films:
         if len(read_film.result.cycles) != 1:
             continue
-        cycle = read_film.result.cycles[0]
-        value, lower, upper = _limits(cycle.contact_restitution)
-        if cycle.collisions and upper > lower and math.isfinite(read_film.film.beads):
-            collisions += cycle.collisions
-            errors.append(value - read_film.film.beads)
-            stated.append(0.5 * (upper - lower) / _SIGMAS)
-    if not errors:
-        return f'| {name} | 0 ' + '| ' * 6 + '|'
-    ratios, weights = np.divide(errors, stated), np.power(stated, -2.0)
+        cycle, sure = read_film.result.cycles[0], read_film.result.sure[0]
+        truth, number = getattr(read_film.film, kind.truth), getattr(cycle, kind.number)
+        limits = _limits(getattr(cycle, kind.interval))
+        if number and limits[2] > limits[1] and math.isfinite(truth):
+            contacts += number
+            truths.append(truth)
+            wide.append(limits)
+            narrow.append(_limits(getattr(sure, kind.interval)))
+    if not truths:
+        return '| 0 ' + '| ' * 6
+    value, lower, upper = np.transpose(wide)
+    errors, stated = value - truths, 0.5 * (upper - lower) / _SIGMAS
+    ratios, weights = errors / stated, stated**-2.0
     return (
-        f'| {name} | {len(errors)} | {collisions} | {ratios.mean():+.2f} '
-        f'| {math.sqrt(np.mean(ratios**2)):.2f} | {np.mean(np.abs(ratios) < 1.0):.2f} '
+        f'| {len(truths)} | {contacts} | {ratios.mean():+.2f} '
+        f'| {math.sqrt(np.mean(ratios**2)):.2f} '
+        f'| {_covered(np.array(narrow), np.array(truths))} '
         f'| {np.average(errors, weights=weights):+.4f} ± {weights.sum() ** -0.5:.4f} '
-        f'| {_systematic_cell(np.array(errors), np.array(stated))} |'
+        f'| {_systematic_cell(errors, stated, kind.bias)} '
     )
 
 
-def _systematic_cell(errors: NDArray[np.float64], stated: NDArray[np.float64]) -> str:
-    """The systematic error that fits best, and that whose log likelihood is lower by 2."""
-    of_collisions = np.maximum(stated**2 - PriorSettings().collision_bias ** 2, 0.0)
-    variances = of_collisions + _SYSTEMATIC[:, np.newaxis] ** 2
+def _systematic_cell(errors: NDArray[np.float64], stated: NDArray[np.float64], bias: float) -> str:
+    """The systematic error that fits best, and that whose log likelihood is lower by 2.
+
+    The stated errors contain the standard deviation `bias` of such an error.
+    """
+    of_contacts = np.maximum(stated**2 - bias**2, 0.0)
+    variances = of_contacts + _SYSTEMATIC[:, np.newaxis] ** 2
     logs = -0.5 * np.sum(errors**2 / variances + np.log(variances), axis=1)
     allowed = _SYSTEMATIC[logs > logs.max() - 2.0]
     return f'{_SYSTEMATIC[logs.argmax()]:.4f}, {allowed.max():.4f}'
