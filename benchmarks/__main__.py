@@ -74,6 +74,7 @@ ALL = (
     'drag',
     'speed_dependence',
     'speed_headlines',
+    'drawn_exponents',
     'sensitivity',
     'gas_statistics',
     'engine',

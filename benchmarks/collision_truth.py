@@ -1,11 +1,10 @@
 """Collisions in drawn films beside the true ones: which of their measures shifts the restitution.
 
-The films and the measurements are those of ``python -m benchmarks foreign_world``. A collision is
-the true one if both beads change their velocities between the same two frames by the restitution
-of the film. A shift is the restitution that all collisions of a tray together like best, less the
-true one, in brackets where their log likelihood is lower by 1/2: as measured, with the radii that
-are told in place of those that show, and with true distances or velocities in place of measured
-ones.
+The films and the measurements are those of ``python -m benchmarks foreign_world``; true collisions
+are those of `true_collisions`. A shift is the restitution that all collisions of a tray together
+like best, less the true one, in brackets where their log likelihood is lower by 1/2: as measured,
+with the radii that are told in place of those that show, and with true distances or velocities in
+place of measured ones.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ import numpy as np
 
 from benchmarks.drawn_films import measured
 from benchmarks.foreign_world import films_drawn
+from benchmarks.true_collisions import counted, true_collision
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.contacts.contact_likelihood import EXCESSES
 from nanorocks_ros.inference.contacts.contact_terms import BEADS, ContactTerms
 from nanorocks_ros.numerics.log_sums import log_sum
-from nanorocks_ros.records import NS, PairCollision
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -32,12 +31,8 @@ if TYPE_CHECKING:
 
     from benchmarks.drawn_films import ReadFilm
     from benchmarks.film_truth import FilmTruth
+    from nanorocks_ros.records import PairCollision
 
-# Before the window and after it collisions do not count [s].
-_BEGIN, _END = 1.75, 2.0
-# Frames before and after the stated time in which the true collision is looked for.
-_FRAMES = 4
-_SAME_RESTITUTION = 0.03
 _SHIFTS = np.linspace(-0.15, 0.1, 251)
 _NAMES = ('as measured', 'radii told', 'true distances', 'true velocities', 'both true')
 
@@ -103,7 +98,7 @@ def _row(tray: int, films: list[ReadFilm]) -> str:
     likelihoods = np.zeros((len(_NAMES), _SHIFTS.size))
     for read_film in films:
         film = read_film.film
-        collisions = list(_counted(read_film))
+        collisions = list(counted(read_film))
         found = (_match(film, read_film.result.epoch_ns, collision) for collision in collisions)
         matches = [match for match in found if match is not None]
         total += len(collisions)
@@ -141,73 +136,23 @@ def _excesses(matches: list[_Match]) -> tuple[float, float, float] | None:
     return true, abs(mean - true), math.sqrt(float(weights @ (told - mean) ** 2))
 
 
-def _counted(read_film: ReadFilm) -> Iterable[PairCollision]:
-    film = read_film.film
-    end = len(film.positions) / film.frame_rate - _END
-    for collision in read_film.result.collisions:
-        if film.shake + _BEGIN <= _time(read_film.result.epoch_ns, collision) <= end:
-            yield collision
-
-
-def _time(epoch_ns: int, collision: PairCollision) -> float:
-    return (collision.stamp_ns - epoch_ns) / NS
-
-
 def _distance(collision: PairCollision) -> float:
     return float(np.hypot(*collision.separation))
 
 
 def _match(film: FilmTruth, epoch_ns: int, seen: PairCollision) -> _Match | None:
-    """The truth of a collision; None if these two beads did not collide alone then."""
-    frame = int(_time(epoch_ns, seen) * film.frame_rate)
-    if not _FRAMES <= frame < len(film.positions) - _FRAMES - 1:
+    """A collision with its truth; None if these two beads did not collide alone then."""
+    true = true_collision(film, epoch_ns, seen)
+    if true is None:
         return None
-    beads = [
-        _nearest(film, frame, place, int(kind))
-        for place, kind in zip(
-            (seen.place, seen.place + seen.separation), seen.species, strict=True
-        )
-    ]
-    velocities = np.concatenate(
-        [film.velocities[:, beads], film.vertical_velocities[:, beads, np.newaxis]], axis=-1
-    )
-    near = velocities[frame - _FRAMES : frame + _FRAMES + 2]
-    relative = near[:, 1] - near[:, 0]
-    change = int(np.argmax(np.linalg.norm(np.diff(relative, axis=0), axis=1)))
-    before, after = near[change], near[change + 1]
-    here = frame - _FRAMES + change
-    places = np.column_stack([film.positions[here, beads], film.heights[here, beads]])
-    line = _line_at_contact(places[1] - places[0], relative[change], film.radii[beads].sum())
-    if line is None:
-        return None
-    approach, parting = relative[change] @ line, relative[change + 1] @ line
-    if approach == 0.0 or abs(-parting / approach - film.beads) > _SAME_RESTITUTION:
-        return None
-    separation = line[:2] * film.radii[beads].sum()
+    radii = film.radii[list(true.beads)]
     return _Match(
         seen=seen,
-        true_radii=film.radii[beads],
+        true_radii=radii,
         told=replace(seen, radii=_told_radii(seen)),
-        true_distances=replace(seen, separation=separation),
-        true_velocities=replace(seen, before=before[:, :2], after=after[:, :2]),
+        true_distances=replace(seen, separation=true.line[:2] * radii.sum()),
+        true_velocities=replace(seen, before=true.before[:, :2], after=true.after[:, :2]),
     )
-
-
-def _nearest(film: FilmTruth, frame: int, place: NDArray[np.float64], kind: int) -> int:
-    distances = np.hypot(*(film.positions[frame] - place).T)
-    return int(np.argmin(np.where(film.species == kind, distances, np.inf)))
-
-
-def _line_at_contact(
-    line: NDArray[np.float64], velocity: NDArray[np.float64], reach: float
-) -> NDArray[np.float64] | None:
-    """Unit line of centres where beads that fly on touch; None if they miss each other."""
-    square, along = float(velocity @ velocity), float(line @ velocity)
-    root = along**2 - square * (float(line @ line) - reach**2)
-    if root <= 0.0 or square == 0.0:
-        return None
-    touching: NDArray[np.float64] = line - velocity * (along + np.sqrt(root)) / square
-    return touching / np.linalg.norm(touching)
 
 
 def _told_radii(seen: PairCollision) -> NDArray[np.float64]:

@@ -2,7 +2,8 @@
 
 One tray in a video file, with light, lens, sensor, codec, scale and frame rate drawn
 (``--effects drawn``), and beads, walls, height, diameter, count and start drawn from the priors.
-A film with drag, friction or sticking has the tray and the camera of the film without.
+A film with drag, friction, sticking or a law of the restitution has the tray and the camera of the
+film without.
 
 Films and results are kept (`filmed_cycles.folder`), results under a key of the source code: an
 interrupted run goes on where it was.
@@ -52,6 +53,8 @@ _SPEEDS = (6e-3, 14e-3)
 # Part of the cameras that jitter or sway.
 _MOVING = 0.2
 _TANGENTIAL = 0.4
+# Impact speed at which restitutions that depend on it are as drawn, [m/s].
+_AT_SPEED = 5e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +70,8 @@ class DrawnFilm:
         Of beads, floor, lid and walls, with a tangential restitution of 0.4; 0 is smooth.
     sticking : float, [m/s]
         Beads stick below this normal speed, to bodies that turn; 0: never.
+    exponent : float
+        Of the impact speed with which beads lose; their restitution is that drawn at 5 mm/s.
     """
 
     tray: int
@@ -74,13 +79,14 @@ class DrawnFilm:
     drag: float = 0.0
     friction: float = 0.0
     sticking: float = 0.0
+    exponent: float = 0.0
 
     @property
     def stem(self) -> Path:
         """The path of the film without its suffix; what was added in thousandths."""
         physics = [
             f'_{name}_{round(1e3 * getattr(self, name))}'
-            for name in ('drag', 'friction', 'sticking')
+            for name in ('drag', 'friction', 'sticking', 'exponent')
             if getattr(self, name)
         ]
         name = f'tray_{self.tray}_{self.number}{"".join(physics)}'
@@ -173,6 +179,12 @@ def _draw(film: DrawnFilm) -> None:
         'seed': 5000 + film.number,
         'sticking_speed': film.sticking,
     }
+    if film.exponent:
+        values |= {
+            'restitution_law': 'power',
+            'restitution_speed': _AT_SPEED,
+            'restitution_exponent': film.exponent,
+        }
     simulation = with_values(SimulationSettings(), values, 'benchmark')
     film.stem.parent.mkdir(parents=True, exist_ok=True)
     seed = 10 * film.number + film.tray

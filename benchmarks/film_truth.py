@@ -10,6 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nanorocks_ros.simulation.engine.rules.restitution_laws import (
+    PowerLawRestitution,
+    compiled_law,
+    restitution_at,
+)
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -37,8 +43,8 @@ class FilmTruth:
         Restitutions; NaN where one number does not describe them.
     sticking : float, [m/s]
         Beads stick below this normal speed; 0: never.
-    ideal : bool
-        Whether beads are smooth spheres of constant restitution in vacuum.
+    law : PowerLawRestitution or None
+        Of the beads, where their restitution depends on speed by a power that is known.
     frame_rate : float, [1/s]
     shake : float, [s]
         Time of the kick.
@@ -65,7 +71,7 @@ class FilmTruth:
     beads: float
     walls: float
     sticking: float
-    ideal: bool
+    law: PowerLawRestitution | None
     frame_rate: float
     shake: float
     scale: float
@@ -78,6 +84,14 @@ class FilmTruth:
     radii: NDArray[np.float64]
     species: NDArray[np.int64]
     merges: NDArray[np.float64]
+
+    def restitution_at(self, speed: float) -> float:
+        """Restitution of beads that meet with a normal speed, [m/s]."""
+        return (
+            float(restitution_at(*compiled_law('beads', self.law), speed))
+            if self.law
+            else self.beads
+        )
 
     @cached_property
     def magnification(self) -> NDArray[np.float64]:
@@ -131,15 +145,15 @@ def read_truth(video: Path) -> FilmTruth:
     height = _camera_height(arrays)
     rate = float(arrays['fps'])
     displacement = arrays['D'].astype(np.float64)
-    spread = any(asked.get(name) for name in ('va', 'vb'))
-    friction = any(asked.get(name) for name in ('mu', 'muw'))
+    law = _law(arrays)
+    spread = law or any(asked.get(name) for name in ('va', 'vb'))
     return FilmTruth(
         video=video,
         tray=int(arrays['tray']),
         beads=float('nan') if spread else float(asked['eps']),
         walls=float(asked['epsw']),
         sticking=float(asked.get('vstick', 0.0)),
-        ideal=not (spread or friction),
+        law=law,
         frame_rate=rate,
         shake=float(arrays['pre']),
         scale=scale,
@@ -152,6 +166,18 @@ def read_truth(video: Path) -> FilmTruth:
         radii=arrays['rad'].astype(np.float64),
         species=arrays['sp'].astype(np.int64),
         merges=np.asarray(arrays['merges'], dtype=np.float64).reshape(-1, 3)[:, 0],
+    )
+
+
+def _law(arrays: dict[str, NDArray[np.generic]]) -> PowerLawRestitution | None:
+    """By which power of the speed beads of a drawn film lose; None where they are constant."""
+    simulation = json.loads(str(arrays['settings']))['simulation'] if 'settings' in arrays else {}
+    if simulation.get('restitution_law') != 'power':
+        return None
+    return PowerLawRestitution(
+        value=float(simulation['restitution']),
+        at_speed=float(simulation['restitution_speed']),
+        exponent=float(simulation['restitution_exponent']),
     )
 
 
