@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +50,8 @@ DECADES = (0.1e-3, 0.3e-3, 1e-3, 3e-3, 10e-3)
 """Limits of the groups of true speeds, [m/s]."""
 _NS = 1e9
 _SURE = 0.68
+# Stated errors within which a speed holds.
+_HOLDS = 2.0
 _RADII_FRAMES = 100
 
 
@@ -67,6 +70,8 @@ class FilmResult:
         The same with intervals of 68 %.
     speed_ratios : tuple of float
         Measured over true mean projected speed in each of `DECADES`; NaN without any.
+    speed_pulls, speeds_held : tuple of float
+        Mean error over the stated one there, and share of errors below twice the stated ones.
     flagged_speeds : float, 0 to 1
         Share of the speeds after the kick with a flag.
     counts : tuple of float
@@ -88,6 +93,8 @@ class FilmResult:
     cycles: tuple[CorEstimate, ...] = ()
     sure: tuple[CorEstimate, ...] = ()
     speed_ratios: tuple[float, ...] = ()
+    speed_pulls: tuple[float, ...] = ()
+    speeds_held: tuple[float, ...] = ()
     flagged_speeds: float = 0.0
     counts: tuple[float, ...] = ()
     radii: tuple[float, ...] = ()
@@ -163,7 +170,7 @@ class _Reading:
             notices=tuple(notices),
             cycles=tuple(last_of_each_cycle(estimates)),
             sure=self._narrower(),
-            speed_ratios=self._speed_ratios(speeds, epoch_ns),
+            **self._compared_speeds(speeds, epoch_ns),
             flagged_speeds=self._flagged(speeds, epoch_ns),
             counts=self._counts(),
             radii=self._radii(epoch_ns),
@@ -200,9 +207,12 @@ class _Reading:
                 estimates += estimator.push(record)
         return tuple(last_of_each_cycle([*estimates, *estimator.flush()]))
 
-    def _speed_ratios(self, speeds: list[SpeedEstimate], epoch_ns: int) -> tuple[float, ...]:
+    def _compared_speeds(
+        self, speeds: list[SpeedEstimate], epoch_ns: int
+    ) -> dict[str, tuple[float, ...]]:
+        """Fields that compare speeds with true ones, in each of `DECADES`."""
         film = self._film
-        sums = np.zeros((len(DECADES) - 1, 2))
+        groups: list[list[tuple[float, float, float]]] = [[] for _ in DECADES[1:]]
         for speed in speeds:
             middle = (speed.stamp_ns - epoch_ns) / _NS
             if middle - 0.5 * speed.window <= film.shake:
@@ -210,14 +220,25 @@ class _Reading:
             first = round((middle - 0.5 * speed.window) * film.frame_rate)
             last = round((middle + 0.5 * speed.window) * film.frame_rate)
             true = film.mean_projected_speed[max(first, 0) : last + 1]
-            value = speed.mean_projected_speed.value
-            if not true.size or not np.isfinite(value):
+            mean = speed.mean_projected_speed
+            if not true.size or not np.isfinite([mean.value, mean.error]).all():
                 continue
             group = int(np.searchsorted(DECADES, true.mean())) - 1
-            if 0 <= group < len(sums):
-                sums[group] += value, true.mean()
-        with np.errstate(invalid='ignore', divide='ignore'):
-            return tuple((sums[:, 0] / sums[:, 1]).tolist())
+            if 0 <= group < len(groups):
+                groups[group].append((mean.value, float(true.mean()), mean.error))
+        ratios, pulls, held = [], [], []
+        for group in groups:
+            value, true, stated = np.reshape(group, (-1, 3)).T
+            with np.errstate(invalid='ignore', divide='ignore'):
+                pull = (value - true) / stated
+                ratios.append(float(value.sum() / true.sum()))
+            pulls.append(float(pull.mean()) if group else math.nan)
+            held.append(float(np.mean(np.abs(pull) < _HOLDS)) if group else math.nan)
+        return {
+            'speed_ratios': tuple(ratios),
+            'speed_pulls': tuple(pulls),
+            'speeds_held': tuple(held),
+        }
 
     def _flagged(self, speeds: list[SpeedEstimate], epoch_ns: int) -> float:
         start_ns = epoch_ns + round(self._film.shake * _NS)

@@ -94,6 +94,11 @@ def print_drawn(read: list[ReadFilm]) -> None:
     print('| --- ' * (4 + len(DECADES) - 1) + '|')
     for tray, films in _by_tray(read).items():
         print(_speed_row(tray, [read_film.result for read_film in films]))
+    print('\nDrawn films: errors of speeds over stated ones, and the share below twice of them\n')
+    print(f'| tray | {groups} |')
+    print('| --- ' * len(DECADES) + '|')
+    for tray, films in _by_tray(read).items():
+        print(_pull_row(tray, [read_film.result for read_film in films]))
     print('\nDrawn films: measured over true speeds, film by film\n')
     print(f'| film | {groups} | speeds flagged |')
     print('| --- ' * (2 + len(DECADES) - 1) + '|')
@@ -274,16 +279,30 @@ def _speed_row(tray: int, results: list[FilmResult]) -> str:
     return row + '|'
 
 
+def _pull_row(tray: int, results: list[FilmResult]) -> str:
+    row = f'| {tray} '
+    for pulls, held in zip(
+        _by_column('speed_pulls', results), _by_column('speeds_held', results), strict=True
+    ):
+        known = np.array(pulls)[np.isfinite(pulls)]
+        row += (
+            f'| {np.median(known):+.2f}, {_spread(known, "+.2f")}, {np.nanmean(held):.2f} '
+            if known.size
+            else '| '
+        )
+    return row + '|'
+
+
 def _by_column(name: str, results: list[FilmResult]) -> list[tuple[float, ...]]:
     """The values of a tuple of numbers, first those of its first element."""
     rows = [getattr(result, name) for result in results if getattr(result, name)]
     return list(zip(*rows, strict=True))
 
 
-def _spread(values: NDArray[np.float64]) -> str:
+def _spread(values: NDArray[np.float64], form: str = '.3f') -> str:
     """Range that holds nine of ten values."""
     low, high = np.nanquantile(values, (0.05, 0.95))
-    return f'{low:.3f} to {high:.3f}'
+    return f'{low:{form}} to {high:{form}}'
 
 
 def print_foreign(read: list[ReadFilm]) -> None:
