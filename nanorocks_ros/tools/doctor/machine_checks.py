@@ -118,7 +118,7 @@ def receive_buffer(path: Path = _RECEIVE_BUFFER) -> Finding:
 
 
 def compiled_kernels() -> Finding:
-    """Whether kernels compiled by numba can be cached for the next start."""
+    """How many kernels are compiled, and whether they can be cached for the next start."""
     name = 'compiled kernels'
     package = Path(nanorocks_ros.__file__).parent
     places = [cache_root()]
@@ -126,7 +126,10 @@ def compiled_kernels() -> Finding:
         places.append(package)
     usable = [place for place in places if _writable(place)]
     if usable:
-        return Finding(name=name, found=f'cached in {usable[0]}')
+        listed, missing = _listed_and_missing_kernels()
+        counts = f'{listed - missing} of {listed} compiled, ' if listed else ''
+        others = '; `nanorocks compile` compiles the others now' if missing else ''
+        return Finding(name=name, found=f'{counts}cached in {usable[0]}{others}')
     return Finding(
         name=name,
         status=Status.WARNING,
@@ -134,6 +137,21 @@ def compiled_kernels() -> Finding:
         'start compiles for a minute',
         remedy='export NUMBA_CACHE_DIR=/a/folder/of/yours',
     )
+
+
+def _listed_and_missing_kernels() -> tuple[int, int]:
+    """How many kernels commands and nodes use, and how many of them are not compiled."""
+    try:
+        from nanorocks_ros.tools.compilation.parallel_compilation import (
+            listed_versions,
+            missing_versions,
+        )
+
+        listed = listed_versions()
+        return len(listed), len(missing_versions(listed))
+    except ImportError:
+        # Another check names the library that is missing.
+        return 0, 0
 
 
 def _writable(folder: Path) -> bool:

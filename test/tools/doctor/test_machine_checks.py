@@ -112,6 +112,27 @@ def test_kernels_that_cannot_be_cached_are_found(monkeypatch, tmp_path):
     assert_told('compiled functions cannot be kept', finding)
 
 
+COUNT_KERNELS = """
+from nanorocks_ros.tools.compilation.parallel_compilation import listed_versions
+from nanorocks_ros.tools.doctor.machine_checks import compiled_kernels
+
+print(len(listed_versions()))
+print(compiled_kernels().found)
+listed_versions()[-1].compile()
+print(compiled_kernels().found)
+"""
+
+
+def test_kernels_that_are_compiled_are_counted(monkeypatch, tmp_path):
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    command = [sys.executable, '-c', COUNT_KERNELS]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    listed, before, after = said.splitlines()
+    rest = f'compiled, cached in {tmp_path}; `nanorocks compile` compiles the others now'
+    assert before == f'0 of {listed} {rest}'
+    assert after == f'1 of {listed} {rest}'
+
+
 def installed_as(monkeypatch, **versions):
     """Let libraries have other versions; None: pip does not know them."""
     real = importlib.metadata.version
