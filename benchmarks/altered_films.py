@@ -43,6 +43,12 @@ _NOISE = 6.0
 _TURN_DEG = 2.0
 _SMALLER = 0.7
 _WRONG_SCALE = 1.03
+# Width of what is squeezed; distortion of a lens at the edge of the picture, and growth by a zoom.
+_NARROWER, _BARREL, _ZOOM = 0.97, 0.03, 0.02
+# Lens blur [px], gain of the sharpening, share of the picture before, and saturation.
+_BLUR, _SHARPENING, _GHOST, _PALER = 1.5, 1.0, 0.3, 0.5
+# Of a dark spot on the lens: place as a part of the picture, and radius [px].
+_SPOT, _SPOT_PX = (0.45, 0.55), 12
 _EVERY = 10
 _CLICK = 37
 
@@ -103,6 +109,89 @@ def _turned(image: _Picture, _: int) -> _Picture:
     )
 
 
+def _warped(image: _Picture, x: NDArray[np.float64], y: NDArray[np.float64]) -> _Picture:
+    """The picture that shows at each place what was at the given one, from -1 to 1."""
+    height, width = image.shape[:2]
+    places = [
+        (0.5 * (size - 1) * (1.0 + axis)).astype(np.float32)
+        for axis, size in ((x, width), (y, height))
+    ]
+    return cv2.remap(image, *places, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _axes(image: _Picture) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    height, width = image.shape[:2]
+    y, x = np.mgrid[-1.0 : 1.0 : height * 1j, -1.0 : 1.0 : width * 1j]
+    return x, y
+
+
+def _squeezed(image: _Picture, _: int) -> _Picture:
+    x, y = _axes(image)
+    return _warped(image, x / _NARROWER, y)
+
+
+def _barrel(image: _Picture, _: int) -> _Picture:
+    x, y = _axes(image)
+    outer = 1.0 + _BARREL * (x**2 + y**2)
+    return _warped(image, x * outer, y * outer)
+
+
+def _zoomed(image: _Picture, number: int) -> _Picture:
+    x, y = _axes(image)
+    larger = 1.0 + _ZOOM * number / _FRAMES_OF_DIMMING
+    return _warped(image, x / larger, y / larger)
+
+
+def _blurred(image: _Picture, _: int) -> _Picture:
+    return cv2.GaussianBlur(image, (0, 0), _BLUR)
+
+
+def _sharpened(image: _Picture, _: int) -> _Picture:
+    soft = cv2.GaussianBlur(image, (0, 0), 1.0)
+    return cv2.addWeighted(image, 1.0 + _SHARPENING, soft, -_SHARPENING, 0.0)
+
+
+def _pale(image: _Picture, number: int) -> _Picture:
+    return cv2.addWeighted(image, _PALER, _gray(image, number), 1.0 - _PALER, 0.0)
+
+
+def _spotted(image: _Picture, _: int) -> _Picture:
+    height, width = image.shape[:2]
+    place = round(_SPOT[0] * width), round(_SPOT[1] * height)
+    return cv2.circle(image.copy(), place, _SPOT_PX, (40, 40, 40), -1, cv2.LINE_AA)
+
+
+def _with_clock(image: _Picture, number: int) -> _Picture:
+    text = f'{number // 1800:02d}:{number // 30 % 60:02d}:{number % 30:02d}'
+    place, font = (20, 40), cv2.FONT_HERSHEY_SIMPLEX
+    return cv2.putText(image.copy(), text, place, font, 1.0, (255, 255, 255), 2, cv2.LINE_AA)
+
+
+class _WithPrevious:
+    """A change that mixes a picture with the one before, by a function of both."""
+
+    def __init__(self, mix: Callable[[_Picture, _Picture], _Picture]) -> None:
+        self._mix = mix
+        self._previous: _Picture | None = None
+
+    def __call__(self, image: _Picture, number: int) -> _Picture:
+        """The altered picture; the first one of a film stays as it is."""
+        previous = image if number == 0 or self._previous is None else self._previous
+        self._previous = image
+        return self._mix(image, previous)
+
+
+def _ghosts(image: _Picture, previous: _Picture) -> _Picture:
+    return cv2.addWeighted(image, 1.0 - _GHOST, previous, _GHOST, 0.0)
+
+
+def _interlaced(image: _Picture, previous: _Picture) -> _Picture:
+    """Every second line is that of the picture before."""
+    woven = image.copy()
+    woven[1::2] = previous[1::2]
+    return woven
+
+
 def _gray(image: _Picture, _: int) -> _Picture:
     return cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
 
@@ -146,6 +235,17 @@ ALTERATIONS: dict[str, Alteration] = {
         numbers=_without(_CLICK), keeps_times=False
     ),
     f'every {_EVERY}th repeated': Alteration(numbers=_repeated, keeps_times=False),
+    'every second frame missing': Alteration(numbers=_without(2)),
+    f'pictures hold {_GHOST:.0%} of the one before': Alteration(picture=_WithPrevious(_ghosts)),
+    'interlaced': Alteration(picture=_WithPrevious(_interlaced)),
+    f'lens blur of {_BLUR:g} px': Alteration(picture=_blurred),
+    'sharpened': Alteration(picture=_sharpened),
+    'half the saturation': Alteration(picture=_pale),
+    'a dark spot on the lens': Alteration(picture=_spotted),
+    'a clock in the picture': Alteration(picture=_with_clock),
+    f'squeezed to {_NARROWER:g} in width': Alteration(picture=_squeezed),
+    f'lens that distorts by {_BARREL:.0%}': Alteration(picture=_barrel),
+    f'zoom by {_ZOOM:.0%} in {_FRAMES_OF_DIMMING} frames': Alteration(picture=_zoomed),
     f'scale told {_WRONG_SCALE - 1:+.0%}': Alteration(scale=_WRONG_SCALE),
     f'scale told {1 / _WRONG_SCALE - 1:+.0%}': Alteration(scale=1.0 / _WRONG_SCALE),
 }
