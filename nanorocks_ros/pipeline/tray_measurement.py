@@ -149,7 +149,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         in_space = self._in_space(image)
         self._oscillation.push(in_space)
         speeds += self._structure_speeds(in_space)
-        return (*notices, *pictures, *self._selected(speeds), *self._reliable(events))
+        chosen = self._completed(self._selector.push(speeds))
+        return (*notices, *pictures, *chosen, *self._reliable(events))
 
     def flush(self) -> tuple[TrayRecord, ...]:
         """Contacts and bodies of the last seconds, and speeds that were still held back."""
@@ -159,7 +160,8 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
         contacts = self._in_cycle(sorted(self._contacts.flush(), key=attrgetter('stamp_ns')))
         notices = [*self._scale_notices(None, contacts), *self._scale.flush()]
         events = [*contacts, *self._bodies.flush(), *self._body_rebounds.flush()]
-        return (*last, *notices, *self._selected(speeds), *self._reliable(events))
+        chosen = self._completed(self._selector.flush(speeds))
+        return (*last, *notices, *chosen, *self._reliable(events))
 
     @property
     def scale_flag(self) -> Quality:
@@ -229,14 +231,15 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             for contact in contacts
         ]
 
-    def _selected(self, speeds: Iterable[SpeedEstimate]) -> list[SpeedEstimate]:
+    def _completed(self, speeds: Iterable[SpeedEstimate]) -> list[SpeedEstimate]:
+        """The speeds, with that of the tray and the flag of the scale."""
         return [
             replace(
                 speed,
                 tray_speed=self._oscillation.speed(speed),
                 quality=speed.quality | self._scale.flag,
             )
-            for speed in self._selector.push(speeds)
+            for speed in speeds
         ]
 
     def _reliable(self, events: list[Event]) -> list[Event]:

@@ -19,13 +19,17 @@ if TYPE_CHECKING:
 # than this [m/s], and rest.
 _LARGEST_ERROR = 0.2
 _REST = 5e-5
+# Speeds from unreliable tracks that are kept while no other method measures.
+_MOST_SPARE = 3000
 
 
 class SpeedSelector:
     """Gives out the speeds of one method, in order of time.
 
     With the setting `speed.method` at `auto` these are the speeds from tracks while the tracks
-    are reliable, and otherwise those from the structure function.
+    are reliable, and otherwise those from the structure function. Where that never comes to know
+    the beads, such as of a gas that has cooled before they moved, these are speeds from unreliable
+    tracks, flagged and late.
 
     Parameters
     ----------
@@ -42,6 +46,7 @@ class SpeedSelector:
         """Start afresh."""
         del stamp_ns
         self._held: list[SpeedEstimate] = []
+        self._spare: list[SpeedEstimate] = []
         self._last_ns: int | None = None
 
     @property
@@ -95,13 +100,15 @@ class SpeedSelector:
             elif speed.method is SpeedMethod.BINARISED_AREA:
                 chosen.append(speed)
             elif structure_counts:
+                self._spare.clear()
                 chosen.append(self._with_hidden_beads(speed))
         chosen += self._from_tracks(from_tracks)
         return tuple(_flag_uncertain(speed) for speed in chosen if self._in_order(speed))
 
-    def flush(self) -> tuple[SpeedEstimate, ...]:
-        """The speeds that were held back until the tracks were judged."""
-        return self.push(())
+    def flush(self, last: Iterable[SpeedEstimate] = ()) -> tuple[SpeedEstimate, ...]:
+        """Take the last speeds of all methods, and give out what is held back."""
+        chosen = self.push(last)
+        return (*chosen, *filter(self._in_order, self._released()))
 
     def _from_tracks(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:
         """Speeds from tracks, held back until it is known whether the tracks are reliable."""
@@ -111,7 +118,18 @@ class SpeedSelector:
         if not self._tracks.judged:
             return []
         held, self._held = self._held, []
-        return held if self._tracks.reliable else []
+        if self._tracks.reliable:
+            return [*self._released(), *held] if held else []
+        if not self._tracks.hopeless:
+            self._spare += held
+            del self._spare[:-_MOST_SPARE]
+        return []
+
+    def _released(self) -> list[SpeedEstimate]:
+        """Speeds from unreliable tracks of a time of which no other method told the speed."""
+        spare, self._spare = self._spare, []
+        unreliable = Quality.FEW_BEADS | Quality.UNCERTAIN
+        return [replace(speed, quality=speed.quality | unreliable) for speed in spare]
 
     def _with_hidden_beads(self, speed: SpeedEstimate) -> SpeedEstimate:
         """A speed from images, with the error of those beads that lie under others, and are slow.
