@@ -36,6 +36,14 @@ _FEWEST_POINTS = 60
 # Smallest slope above the noise, [gray levels/px], and share of the steepest that is as good.
 _SMALLEST_SLOPE = 3.0
 _STEEP = 0.3
+_STEEPEST = 0.98
+# What is so many times as steep as the walls, with the pixels around it, is laid over the picture;
+# length of wall of which the steepest slope is taken.
+_LAID_OVER, _AROUND_PX, _CELL_PX = 3.0, 9, 16
+# Parts of each side of the walls that vote on the displacement, fewest points of a part and fewest
+# parts; and the displacement by which most of them may differ from the common one, [px].
+_PARTS, _FEWEST_VOTES, _FEWEST_PARTS, _OUTVOTED_PX = 6, 5, 5, 0.15
+_ALL_VOTE, _VOTE_EVERY = 64, 4
 # Distance from the floor within which it is blurred into the wall, [px].
 _BLUR = 2
 # Range of the search for a lost tray, and for one with a registered neighbour, [px].
@@ -102,7 +110,9 @@ class TrayRegistration:
         self._places: NDArray[np.float64] | None = None
         self._slopes = self._reference = self._values = np.empty(0)
         self._trust = self._powers = np.empty(0)
-        self._seen = 0
+        self._parts = np.empty(0, dtype=np.intp)
+        self._moves = np.empty(0, dtype=bool)
+        self._seen, self._pictures = 0, 0
         self._last = Shift(0.0, 0.0, 0.0)
 
     def push(self, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
@@ -139,10 +149,16 @@ class TrayRegistration:
             shift = self._registered(image, start)
         if shift is None:
             return None
+        self._pictures += 1
+        # The first pictures make the reference.
+        votes = self._pictures <= _ALL_VOTE or self._pictures % _VOTE_EVERY == 0
+        if votes and self._outvoted():
+            shift = self._registered(image, (shift.x, shift.y)) or shift
         self._last = shift
         # The average has less noise than a single picture.
         self._seen = min(self._seen + 1, _MEMORY)
         update_reference(self._values, self._seen, self._reference, self._powers, self._trust)
+        self._trust *= self._moves
         return shift
 
     @property
@@ -175,6 +191,33 @@ class TrayRegistration:
             return None
         return Shift(x, y, math.hypot(error, _INTERPOLATION))
 
+    def _outvoted(self) -> bool:
+        """Whether most parts of the walls moved otherwise than all points together.
+
+        What is laid over the picture, such as writing, stays where it is and has steep edges, and
+        may outweigh the walls. Points of parts that are not with the majority are left out.
+        """
+        differences = self._values - self._reference
+        count = 4 * _PARTS
+        outvoted = False
+        for axis in (0, 1):
+            slopes = self._slopes[:, axis]
+            seen = self._moves & (np.abs(slopes) > _SMALLEST_SLOPE)
+            parts, own = self._parts[seen], slopes[seen]
+            votes = np.bincount(parts, minlength=count)
+            voting = votes >= _FEWEST_VOTES
+            if np.count_nonzero(voting) < _FEWEST_PARTS:
+                continue
+            weights = np.maximum(np.bincount(parts, own * own, minlength=count), 1.0)
+            moved = np.bincount(parts, -own * differences[seen], minlength=count) / weights
+            usual = median(moved[voting].tolist())
+            if abs(usual) > _OUTVOTED_PX:
+                stays = voting & (np.abs(moved - usual) > abs(usual))
+                self._moves &= ~stays[self._parts]
+                outvoted = outvoted or bool(stays.any())
+        self._trust *= self._moves
+        return outvoted
+
     def _choose_points(self, image: NDArray[np.uint8]) -> Shift | None:
         """Choose the points to register; None when the walls have too few edges."""
         points, slopes = self._edges(image)
@@ -183,11 +226,24 @@ class TrayRegistration:
         self._reference = np.empty(len(points))
         self._values = np.empty(len(points))
         self._powers, self._trust = np.ones(len(points)), np.ones(len(points))
+        self._parts = self._parts_of(points)
+        self._moves = np.ones(len(points), dtype=bool)
         if not len(points):
             return None
         sample(image, self._mix, self._places, (0.0, 0.0), self._reference)
         self._seen = 1
         return self._registered(image, (0.0, 0.0))
+
+    def _parts_of(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Number of the part of the walls in which each point lies."""
+        region = self._region
+        x, y = (points - (region.x, region.y)).T / np.array([[region.width], [region.height]])
+        along = np.where((x < 0.0) | (x > 1.0), y, x)
+        side = np.select([x < 0.0, x > 1.0, y < 0.0], [0, 1, 2], 3)
+        parts: NDArray[np.intp] = _PARTS * side + np.clip(_PARTS * along, 0, _PARTS - 1).astype(
+            int
+        )
+        return parts
 
     def _edges(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         region, margin = self._region, self._wall + 2
@@ -211,18 +267,47 @@ class TrayRegistration:
         height, width = image.shape[:2]
         usable &= (places[..., 0] >= 1.0) & (places[..., 0] <= width - 1.0)
         usable &= (places[..., 1] >= 1.0) & (places[..., 1] <= height - 1.0)
-        chosen = [_steepest(np.abs(steepness[..., axis]), usable) for axis in (0, 1)]
+        across, down = np.abs(np.moveaxis(steepness, -1, 0))
+        usable &= ~_is_laid_over(across, usable, inner) & ~_is_laid_over(down.T, usable.T, inner).T
+        chosen = [_steepest(slope, usable) for slope in (across, down)]
         if min(len(points) for points in chosen) < _FEWEST_POINTS:
             return np.empty((0, 2)), np.empty((0, 2))
         pixels = np.unique(np.concatenate(chosen))
         return grid.reshape(-1, 2)[pixels], np.ascontiguousarray(slopes.reshape(-1, 2)[pixels])
 
 
+def _is_laid_over(
+    slope: NDArray[np.float64], usable: NDArray[np.bool_], side: int
+) -> NDArray[np.bool_]:
+    """What has far steeper slopes along the rows than the walls at both ends of them.
+
+    Such as a clock or a name that a recorder writes into the picture, which does not move with
+    the tray.
+
+    Parameters
+    ----------
+    slope : ndarray, (rows, columns), [gray levels/px]
+    usable : ndarray of bool, (rows, columns)
+    side : int, [px]
+        Width of a wall.
+    """
+    usual = 0.0
+    for wall in (slice(0, side), slice(slope.shape[1] - side, None)):
+        cells = [
+            np.quantile(seen, _STEEPEST)
+            for row in range(0, slope.shape[0], _CELL_PX)
+            if (seen := slope[row : row + _CELL_PX, wall][usable[row : row + _CELL_PX, wall]]).size
+        ]
+        usual = max(usual, median(cells) if cells else 0.0)
+    steep = (usable & (slope > _LAID_OVER * max(usual, _SMALLEST_SLOPE))).astype(np.uint8)
+    return cv2.dilate(steep, np.ones((_AROUND_PX, _AROUND_PX), dtype=np.uint8)) > 0
+
+
 def _steepest(slope: NDArray[np.float64], usable: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Flat indices of steep pixels, spread evenly over all that are steep enough."""
     if not usable.any():
         return np.empty(0, dtype=np.intp)
-    smallest = max(_SMALLEST_SLOPE, _STEEP * float(np.quantile(slope[usable], 0.98)))
+    smallest = max(_SMALLEST_SLOPE, _STEEP * float(np.quantile(slope[usable], _STEEPEST)))
     steep = np.flatnonzero(usable & (slope >= smallest))
     if steep.size <= _POINTS:
         return steep

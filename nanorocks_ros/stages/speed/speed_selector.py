@@ -28,8 +28,8 @@ class SpeedSelector:
 
     With the setting `speed.method` at `auto` these are the speeds from tracks while the tracks
     are reliable, and otherwise those from the structure function. Where that never comes to know
-    the beads, such as of a gas that has cooled before they moved, these are speeds from unreliable
-    tracks, flagged and late.
+    the beads, such as of a gas that cools at once, these are in the end speeds from unreliable
+    tracks, flagged.
 
     Parameters
     ----------
@@ -108,7 +108,10 @@ class SpeedSelector:
     def flush(self, last: Iterable[SpeedEstimate] = ()) -> tuple[SpeedEstimate, ...]:
         """Take the last speeds of all methods, and give out what is held back."""
         chosen = self.push(last)
-        return (*chosen, *filter(self._in_order, self._released()))
+        spare, self._spare = self._spare, []
+        unreliable = Quality.FEW_BEADS | Quality.UNCERTAIN
+        flagged = (replace(speed, quality=speed.quality | unreliable) for speed in spare)
+        return (*chosen, *filter(self._in_order, flagged))
 
     def _from_tracks(self, speeds: list[SpeedEstimate]) -> list[SpeedEstimate]:
         """Speeds from tracks, held back until it is known whether the tracks are reliable."""
@@ -119,17 +122,12 @@ class SpeedSelector:
             return []
         held, self._held = self._held, []
         if self._tracks.reliable:
-            return [*self._released(), *held] if held else []
+            self._spare.clear()
+            return held
         if not self._tracks.hopeless:
             self._spare += held
             del self._spare[:-_MOST_SPARE]
         return []
-
-    def _released(self) -> list[SpeedEstimate]:
-        """Speeds from unreliable tracks of a time of which no other method told the speed."""
-        spare, self._spare = self._spare, []
-        unreliable = Quality.FEW_BEADS | Quality.UNCERTAIN
-        return [replace(speed, quality=speed.quality | unreliable) for speed in spare]
 
     def _with_hidden_beads(self, speed: SpeedEstimate) -> SpeedEstimate:
         """A speed from images, with the error of those beads that lie under others, and are slow.

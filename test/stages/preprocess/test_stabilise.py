@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from plates import SCALE, Plate
@@ -87,6 +88,22 @@ def test_a_jump_of_many_pixels_between_two_frames_is_found(plate):
     shift = tracker.push(plate.picture((11.3, -7.6), seed=2), None)
     assert shift.x == pytest.approx(11.3, abs=0.1)
     assert shift.y == pytest.approx(-7.6, abs=0.1)
+
+
+@pytest.mark.parametrize('corners', [('top',), ('top', 'bottom')])
+def test_writing_over_the_walls_that_does_not_move_does_not_hold_the_tray(plate, corners):
+    tracker = follower(plate)
+    x, y, width, height = plate.regions[3]
+    places = {'top': (x - 8, y - 2), 'bottom': (x + width - 40, y + height + 8)}
+    off = []
+    for k, (dx, dy) in enumerate(swing(30)):
+        picture = plate.picture((dx, dy), seed=k)
+        for corner in corners:
+            style = cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA
+            cv2.putText(picture, f'0{k % 10}:1{k}', places[corner], *style)
+        shift = tracker.push(picture, None)
+        off.append((shift.x - dx, shift.y - dy))
+    assert np.sqrt(np.square(off).mean(axis=0)).max() < 0.07
 
 
 def test_a_picture_without_the_tray_is_a_loss_and_the_next_with_it_is_not(plate):
