@@ -5,6 +5,7 @@ Tested by ``test/studies/film_import/test_import_times.py``.
 
 from __future__ import annotations
 
+import shlex
 from collections import deque
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -135,6 +136,8 @@ class Video:
         unchanged = self._rotation == UNROTATED and self._square == self._sides
         info.as_stored = unchanged and self._is_jpeg(packet, info)
         info.remarks = self._remarks(info)
+        if first.interlaced_frame:
+            info.remarks += (_interlaced(path),)
         return info
 
     def _first_frame(self, path: Path, container: Any, stream: Any) -> tuple[Any, bytes]:
@@ -268,6 +271,16 @@ class Video:
             if packet.pos is not None and self._bytes:
                 done = min(1.0, max(done, packet.pos / self._bytes))
             yield packet, done
+
+
+def _interlaced(path: Path) -> str:
+    """What to say of a film whose frames are marked as made of two fields."""
+    progressive = shlex.quote(f'{path.stem}_progressive.mp4')
+    return (
+        f'{path}: is marked as interlaced, every second line from another time; if moving beads '
+        'look like combs, speeds read low: set the camera to progressive, or '
+        f'`ffmpeg -i {shlex.quote(str(path))} -vf bwdif=mode=send_field -crf 15 {progressive}`'
+    )
 
 
 def _reason(error: Exception) -> str:

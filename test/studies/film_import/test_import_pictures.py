@@ -18,6 +18,7 @@ from videos import (
     picture,
     set_display_matrix,
     write_images,
+    write_video,
 )
 
 from nanorocks_ros.errors import RecordingError
@@ -70,6 +71,20 @@ def test_16_bit_images_keep_the_levels_of_the_camera(tmp_path, bits, ending):
     assert any(text in notice for notice in result.notices) == (bits < 16)
     as_stored = bits == 16 and ending == 'png'
     assert (result.provenance['pictures'] == 'as stored') == as_stored
+
+
+# --- interlaced films -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('marked', [True, False])
+def test_a_film_that_is_marked_as_interlaced_says_so(tmp_path, marked):
+    options = {'x264-params': 'tff=1'} if marked else {}
+    film = write_video(tmp_path / 'my film.mp4', range(4), codec='libx264', **options)
+    result, _, _ = imported(film, tmp_path / 'bag')
+    said = [notice for notice in result.notices if 'interlaced' in notice]
+    assert len(said) == marked
+    if marked:
+        assert f"ffmpeg -i '{film}' -vf bwdif" in said[0]
 
 
 # --- pixels that are not square -------------------------------------------------------------
