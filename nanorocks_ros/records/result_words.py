@@ -102,9 +102,10 @@ FLAGS = {
         'contact_restitution',
     ),
     Quality.DOUBTFUL_SCALE: Words(
-        'rulers of the scale (told, radii, contacts, walls) differ by more than 2 %; a notice '
-        'says which',
-        'correct what the notice names: --preprocess-pixels-per-metre, or sizes in the trays file',
+        'rulers of the scale (told, radii, contacts, walls) differ by more than 2 %, or the size '
+        'of the tray in the picture changes; a notice says which',
+        'correct what the notice names: --preprocess-pixels-per-metre, sizes in the trays file, '
+        'or zoom and focus of the camera',
     ),
     Quality.ACCELERATED: Words(
         'all beads are accelerated the same way, which changes their speeds: the tray falls or '

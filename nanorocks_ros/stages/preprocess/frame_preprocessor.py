@@ -122,7 +122,8 @@ class Preprocessor:
         if not verdict.usable:
             return (*held, *notices, *verdict.notices)
         images = self._tray_images(frame, verdict.rows, verdict.quality)
-        return (*held, *notices, *images, *verdict.notices, *self._check_positions(frame))
+        found = (*self._check_positions(frame), *self._check_sizes(frame.stamp_ns))
+        return (*held, *notices, *images, *verdict.notices, *found)
 
     def flush(self) -> tuple[TrayImage, ...]:
         """The tray images that are held back, at the end of the recording."""
@@ -142,6 +143,7 @@ class Preprocessor:
         self._frames = 0
         self._suspects: frozenset[int] = frozenset()
         self._misplaced: frozenset[int] = frozenset()
+        self._grown: set[int] = set()
         self._checks = FrameChecks(self._camera)
         self._counter = ShakeCounter(speed.min_cycle_duration)
         self._held = HeldImages(self._counter)
@@ -156,6 +158,19 @@ class Preprocessor:
                 encoding=self._encoding,
             )
             for tray, region in zip(self._trays, self._regions, strict=True)
+        )
+
+    def _check_sizes(self, stamp_ns: int) -> tuple[Notice, ...]:
+        """Say of which trays the size in the picture changes, once."""
+        grown = [crop.tray for crop in self._crops if crop.grows and crop.tray not in self._grown]
+        self._grown.update(grown)
+        return tuple(
+            Notice(
+                stamp_ns=stamp_ns,
+                text=f'tray {tray}: its size in the picture changes, so that no scale holds for '
+                'all frames; results carry DOUBTFUL_SCALE; hold zoom and focus, and the camera',
+            )
+            for tray in grown
         )
 
     def _check_positions(self, frame: Frame) -> tuple[Notice, ...]:
@@ -229,6 +244,8 @@ class Preprocessor:
         pending, crop.pending = crop.pending, Quality(0)
         if crop.tray in self._misplaced:
             pending |= Quality.WRONG_SCALE
+        if crop.grows:
+            pending |= Quality.DOUBTFUL_SCALE
         return TrayImage(
             stamp_ns=stamp_ns,
             tray=crop.tray,

@@ -40,10 +40,13 @@ _STEEPEST = 0.98
 # What is so many times as steep as the walls, with the pixels around it, is laid over the picture;
 # length of wall of which the steepest slope is taken.
 _LAID_OVER, _AROUND_PX, _CELL_PX = 3.0, 9, 16
-# Parts of each side of the walls that vote on the displacement, fewest points of a part and fewest
-# parts; and the displacement by which most of them may differ from the common one, [px].
-_PARTS, _FEWEST_VOTES, _FEWEST_PARTS, _OUTVOTED_PX = 6, 5, 5, 0.15
-_ALL_VOTE, _VOTE_EVERY = 64, 4
+# Parts of each wall, whose motions are compared, and fewest points of a part; number of the first
+# pictures, with whose mean they are compared, and pictures between two comparisons.
+_PARTS, _FEWEST_IN_PART = 6, 5
+_FIRST_PICTURES, _EVERY = 64, 4
+# Distance by which two opposite walls move apart, or together, in so many comparisons: the camera
+# zooms.
+_GROWN_PX, _GROWN_TIMES, _FEWEST_OF_WALL = 0.6, 10, 3
 # Distance from the floor within which it is blurred into the wall, [px].
 _BLUR = 2
 # Range of the search for a lost tray, and for one with a registered neighbour, [px].
@@ -98,6 +101,11 @@ class TrayRegistration:
         Width of the wall.
     mix : ndarray of float64, (channels,)
         Weights of the channels of the pictures in their gray mix.
+
+    Attributes
+    ----------
+    grows : bool
+        Whether the tray has grown or shrunk in the picture.
     """
 
     def __init__(
@@ -108,11 +116,11 @@ class TrayRegistration:
         self._wall = max(4, math.ceil(wall_px))
         self._mix = mix
         self._places: NDArray[np.float64] | None = None
-        self._slopes = self._reference = self._values = np.empty(0)
+        self._slopes = self._first = self._reference = self._values = np.empty(0)
         self._trust = self._powers = np.empty(0)
         self._parts = np.empty(0, dtype=np.intp)
-        self._moves = np.empty(0, dtype=bool)
-        self._seen, self._pictures = 0, 0
+        self._seen, self._pictures, self._grown = 0, 0, 0
+        self.grows = False
         self._last = Shift(0.0, 0.0, 0.0)
 
     def push(self, image: NDArray[np.uint8], hint: Shift | None) -> Shift | None:
@@ -150,15 +158,14 @@ class TrayRegistration:
         if shift is None:
             return None
         self._pictures += 1
-        # The first pictures make the reference.
-        votes = self._pictures <= _ALL_VOTE or self._pictures % _VOTE_EVERY == 0
-        if votes and self._outvoted():
-            shift = self._registered(image, (shift.x, shift.y)) or shift
+        if self._pictures == _FIRST_PICTURES:
+            self._first = self._reference.copy()
+        if self._first.size and self._pictures % _EVERY == 0:
+            self._compare_sizes()
         self._last = shift
         # The average has less noise than a single picture.
         self._seen = min(self._seen + 1, _MEMORY)
         update_reference(self._values, self._seen, self._reference, self._powers, self._trust)
-        self._trust *= self._moves
         return shift
 
     @property
@@ -191,32 +198,32 @@ class TrayRegistration:
             return None
         return Shift(x, y, math.hypot(error, _INTERPOLATION))
 
-    def _outvoted(self) -> bool:
-        """Whether most parts of the walls moved otherwise than all points together.
+    def _compare_sizes(self) -> None:
+        """Whether opposite walls have moved apart since the first pictures."""
+        # The light may have changed.
+        light = np.polyfit(self._first, self._values, 1)
+        differences = self._values - np.polyval(light, self._first)
+        grown = max(abs(_apart(self._moved_parts(axis, differences))) for axis in (0, 1))
+        self._grown = self._grown + 1 if grown > _GROWN_PX else 0
+        self.grows = self.grows or self._grown >= _GROWN_TIMES
 
-        What is laid over the picture, such as writing, stays where it is and has steep edges, and
-        may outweigh the walls. Points of parts that are not with the majority are left out.
+    def _moved_parts(self, axis: int, differences: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By how much parts of the two walls across an axis have moved, [px]; NaN for few points.
+
+        Parameters
+        ----------
+        axis : int
+        differences : ndarray (n,), [gray levels]
+            From an earlier picture.
         """
-        differences = self._values - self._reference
+        slopes = self._slopes[:, axis]
+        seen = np.abs(slopes) > _SMALLEST_SLOPE
+        parts, own = self._parts[seen], slopes[seen]
         count = 4 * _PARTS
-        outvoted = False
-        for axis in (0, 1):
-            slopes = self._slopes[:, axis]
-            seen = self._moves & (np.abs(slopes) > _SMALLEST_SLOPE)
-            parts, own = self._parts[seen], slopes[seen]
-            votes = np.bincount(parts, minlength=count)
-            voting = votes >= _FEWEST_VOTES
-            if np.count_nonzero(voting) < _FEWEST_PARTS:
-                continue
-            weights = np.maximum(np.bincount(parts, own * own, minlength=count), 1.0)
-            moved = np.bincount(parts, -own * differences[seen], minlength=count) / weights
-            usual = median(moved[voting].tolist())
-            if abs(usual) > _OUTVOTED_PX:
-                stays = voting & (np.abs(moved - usual) > abs(usual))
-                self._moves &= ~stays[self._parts]
-                outvoted = outvoted or bool(stays.any())
-        self._trust *= self._moves
-        return outvoted
+        weights = np.maximum(np.bincount(parts, own * own, minlength=count), 1.0)
+        moved = np.bincount(parts, -own * differences[seen], minlength=count) / weights
+        few = np.bincount(parts, minlength=count) < _FEWEST_IN_PART
+        return np.where(few, np.nan, moved)[2 * _PARTS * axis :][: 2 * _PARTS]
 
     def _choose_points(self, image: NDArray[np.uint8]) -> Shift | None:
         """Choose the points to register; None when the walls have too few edges."""
@@ -227,7 +234,6 @@ class TrayRegistration:
         self._values = np.empty(len(points))
         self._powers, self._trust = np.ones(len(points)), np.ones(len(points))
         self._parts = self._parts_of(points)
-        self._moves = np.ones(len(points), dtype=bool)
         if not len(points):
             return None
         sample(image, self._mix, self._places, (0.0, 0.0), self._reference)
@@ -239,6 +245,7 @@ class TrayRegistration:
         region = self._region
         x, y = (points - (region.x, region.y)).T / np.array([[region.width], [region.height]])
         along = np.where((x < 0.0) | (x > 1.0), y, x)
+        # Left, right, above and below: each axis has two walls across it.
         side = np.select([x < 0.0, x > 1.0, y < 0.0], [0, 1, 2], 3)
         parts: NDArray[np.intp] = _PARTS * side + np.clip(_PARTS * along, 0, _PARTS - 1).astype(
             int
@@ -274,6 +281,14 @@ class TrayRegistration:
             return np.empty((0, 2)), np.empty((0, 2))
         pixels = np.unique(np.concatenate(chosen))
         return grid.reshape(-1, 2)[pixels], np.ascontiguousarray(slopes.reshape(-1, 2)[pixels])
+
+
+def _apart(moved: NDArray[np.float64]) -> float:
+    """By how much the parts of two opposite walls have moved apart, [px]; 0 if not known."""
+    before, behind = (wall[np.isfinite(wall)].tolist() for wall in np.split(moved, 2))
+    if min(len(before), len(behind)) < _FEWEST_OF_WALL:
+        return 0.0
+    return median(behind) - median(before)
 
 
 def _is_laid_over(

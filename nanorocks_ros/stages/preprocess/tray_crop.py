@@ -104,6 +104,11 @@ class TrayCrop:
         return float(self._nodes[:-1, :-1, 1].max()) + 1.0
 
     @property
+    def grows(self) -> bool:
+        """Whether the tray has grown or shrunk in the picture since the start."""
+        return self._registration is not None and self._registration.grows
+
+    @property
     def jitters(self) -> bool:
         """Whether the motion in the last frames is no swing of a tray on springs."""
         return self._jitter.jitters
