@@ -87,11 +87,9 @@ class FilmTruth:
 
     def restitution_at(self, speed: float) -> float:
         """Restitution of beads that meet with a normal speed, [m/s]."""
-        return (
-            float(restitution_at(*compiled_law('beads', self.law), speed))
-            if self.law
-            else self.beads
-        )
+        if self.law is None:
+            return self.beads
+        return float(restitution_at(*compiled_law('beads', self.law), speed))
 
     @cached_property
     def magnification(self) -> NDArray[np.float64]:

@@ -43,10 +43,10 @@ _LAID_OVER, _AROUND_PX, _CELL_PX = 3.0, 9, 16
 # Parts of each wall, whose motions are compared, and fewest points of a part; number of the first
 # pictures, with whose mean they are compared, and pictures between two comparisons.
 _PARTS, _FEWEST_IN_PART = 6, 5
-_FIRST_PICTURES, _EVERY = 64, 4
+_FIRST_PICTURES, _EVERY = 64, 16
 # Distance by which two opposite walls move apart, or together, in so many comparisons: the camera
 # zooms.
-_GROWN_PX, _GROWN_TIMES, _FEWEST_OF_WALL = 0.6, 10, 3
+_GROWN_PX, _GROWN_TIMES, _FEWEST_OF_WALL = 0.6, 4, 3
 # Distance from the floor within which it is blurred into the wall, [px].
 _BLUR = 2
 # Range of the search for a lost tray, and for one with a registered neighbour, [px].

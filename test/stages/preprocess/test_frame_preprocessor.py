@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.pipeline.composition import trays_of
-from nanorocks_ros.records import Frame, Notice, TrayImage
+from nanorocks_ros.records import Frame, Notice, Quality, TrayImage
 from nanorocks_ros.settings import PipelineSettings, with_values
 from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
@@ -90,6 +91,42 @@ def test_a_frame_whose_size_changes_is_refused_and_the_next_good_one_is_not():
 def test_a_frame_smaller_than_the_tray_is_refused():
     with pytest.raises(FrameError, match=r'tray 1 .* does not lie inside the 100x100 px frame'):
         preprocessor().push(frame(size=(100, 100)))
+
+
+def test_a_zoom_is_said_once_and_flagged():
+    sides = (260, 200)
+    still = np.full((200, 260, 3), 120.0)
+    still[43:157, 53:207] = 40.0
+    still[50:150, 60:200] = 180.0
+    still = cv2.GaussianBlur(still, (0, 0), 1.2)
+    stage = preprocessor(
+        **{
+            'preprocess.pixels_per_metre': 9000.0,
+            'preprocess.regions_px': [60, 50, 140, 100],
+            'preprocess.check_tray_positions': False,
+        }
+    )
+    random = np.random.default_rng(4)
+    said, images = [], []
+    for number in range(150):
+        zoom = cv2.getRotationMatrix2D((135.0, 80.0), 0.0, 1.0 + 0.0002 * number)
+        picture = cv2.warpAffine(still, zoom, sides, borderMode=cv2.BORDER_REPLICATE)
+        noisy = picture + random.normal(0.0, 2.0, picture.shape)
+        records = stage.push(
+            Frame(
+                stamp_ns=number * NS // 30,
+                encoding='bgr8',
+                image=noisy.round().clip(0, 255).astype(np.uint8),
+            )
+        )
+        said += [record.text for record in records if isinstance(record, Notice)]
+        images += [record for record in records if isinstance(record, TrayImage)]
+    assert [text for text in said if 'zoom' in text] == [
+        'tray 1: its size in the picture changes, so that no scale holds for all frames; results '
+        'carry DOUBTFUL_SCALE; hold zoom and focus, and the camera'
+    ]
+    assert Quality.DOUBTFUL_SCALE in images[-1].quality
+    assert Quality.DOUBTFUL_SCALE not in images[60].quality
 
 
 @pytest.mark.parametrize('late_ns', [0, NS // 30, NS // 2])

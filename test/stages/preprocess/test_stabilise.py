@@ -116,7 +116,7 @@ def test_a_tray_that_grows_in_the_picture_is_noticed(rate):
     still[50:150, 60:200] = 180.0
     still = cv2.GaussianBlur(still, (0, 0), 1.2)
     random = np.random.default_rng(4)
-    for k, shift in enumerate(swing(130)):
+    for k, shift in enumerate(swing(150)):
         zoom = cv2.getRotationMatrix2D((sides / 2 + (5, -20)).tolist(), 0.0, 1.0 + rate * k)
         zoom[:, 2] += shift
         picture = cv2.warpAffine(still, zoom, sides.tolist(), borderMode=cv2.BORDER_REPLICATE)
