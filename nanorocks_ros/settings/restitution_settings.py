@@ -21,7 +21,7 @@ class StickingSettings:
         choices=('normal', 'total'),
     )
     rate_error: float = setting(
-        0.1, 'relative standard error of the collision rates of bodies', low=0.0, high=1.0
+        0.25, 'relative standard error of the collision rates of bodies', low=0.0, high=1.0
     )
     probability: float = setting(0.95, 'probability of the interval', low=0.5, high=0.999)
 

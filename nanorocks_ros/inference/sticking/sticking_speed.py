@@ -67,7 +67,7 @@ def sticking_estimate(
     measure: str = 'normal',
     highest: float = 0.03,
     least_share: float = 0.3,
-    rate_error: float = 0.1,
+    rate_error: float = 0.25,
     probability: float = 0.95,
 ) -> StickingEstimate:
     """Sticking speed from the merges of bodies, with a flat prior up to `highest`.
