@@ -82,7 +82,8 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
         test/cli/test_interrupts.py test/test_docs.py test/test_external_links.py \
         test/test_mirror.py test/test_validation_tables.py test/test_installation.py \
         test/physics/test_paper_numbers.py test/studies/synthetic/test_trajectory.py \
-        test/studies/synthetic/test_simulated_runs.py
+        test/studies/synthetic/test_simulated_runs.py test/physics/test_rough_spheres.py \
+        test/studies/decays
 
 # Beside `make venv`, see .ci/run.
 dependencies-oldest:
