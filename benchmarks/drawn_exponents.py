@@ -83,7 +83,9 @@ def _exponents(films: Sequence[ReadFilm], exponent: float) -> str:
         if math.isfinite(interval.value) and stated > 0.0:
             holds = interval.lower <= exponent <= interval.upper
             rows.append((interval.value - exponent, stated, holds))
-    errors, stated, holds = np.array(rows).reshape(-1, 3).T
+    if not rows:
+        return '0 | | | | | '
+    errors, stated, holds = np.array(rows).T
     ratios = errors / stated
     return (
         f'{errors.size} | {ratios.mean():+.2f} | {math.sqrt(np.mean(ratios**2)):.2f} '
@@ -118,7 +120,9 @@ def _headlines(films: Sequence[ReadFilm]) -> str:
                     constant.lower <= truth <= constant.upper,
                 )
             )
-    holds, errors, halves, constant_holds = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+    if not rows:
+        return '| | | '
+    holds, errors, halves, constant_holds = np.array(rows, dtype=np.float64).T
     return (
         f'{holds.mean():.2f} of {holds.size} | {np.median(errors):+.4f} | '
         f'{np.median(halves):.4f} | {constant_holds.mean():.2f}'
