@@ -37,7 +37,7 @@ _CRF = 20
 _LOW_CRF = 32
 # Brightness over a film, over a lamp's cycle, and its exponent.
 _DIMMING, _FLICKER, _GAMMA = 0.35, 0.04, 0.6
-_FRAMES_OF_DIMMING = 1200
+_FRAMES_OF_CHANGE = 1200
 _VIGNETTE = 0.35
 _NOISE = 6.0
 _TURN_DEG = 2.0
@@ -138,7 +138,7 @@ def _barrel(image: _Picture, _: int) -> _Picture:
 
 def _zoomed(image: _Picture, number: int) -> _Picture:
     x, y = _axes(image)
-    larger = 1.0 + _ZOOM * number / _FRAMES_OF_DIMMING
+    larger = 1.0 + _ZOOM * number / _FRAMES_OF_CHANGE
     return _warped(image, x / larger, y / larger)
 
 
@@ -213,8 +213,8 @@ def _repeated(count: int) -> NDArray[np.int64]:
 ALTERATIONS: dict[str, Alteration] = {
     'as it is, written again': Alteration(),
     f'H.264 at crf {_LOW_CRF}': Alteration(crf=_LOW_CRF),
-    f'light falls by {_DIMMING:.0%} in {_FRAMES_OF_DIMMING} frames': Alteration(
-        picture=_brightness(lambda number: 1.0 - _DIMMING * number / _FRAMES_OF_DIMMING)
+    f'light falls by {_DIMMING:.0%} in {_FRAMES_OF_CHANGE} frames': Alteration(
+        picture=_brightness(lambda number: 1.0 - _DIMMING * number / _FRAMES_OF_CHANGE)
     ),
     f'light flickers by {_FLICKER:.0%}': Alteration(
         picture=_brightness(lambda number: 1.0 + _FLICKER * (-1.0) ** number)
@@ -245,7 +245,7 @@ ALTERATIONS: dict[str, Alteration] = {
     'a clock in the picture': Alteration(picture=_with_clock),
     f'squeezed to {_NARROWER:g} in width': Alteration(picture=_squeezed),
     f'lens that distorts by {_BARREL:.0%}': Alteration(picture=_barrel),
-    f'zoom by {_ZOOM:.0%} in {_FRAMES_OF_DIMMING} frames': Alteration(picture=_zoomed),
+    f'zoom by {_ZOOM:.0%} in {_FRAMES_OF_CHANGE} frames': Alteration(picture=_zoomed),
     f'scale told {_WRONG_SCALE - 1:+.0%}': Alteration(scale=_WRONG_SCALE),
     f'scale told {1 / _WRONG_SCALE - 1:+.0%}': Alteration(scale=1.0 / _WRONG_SCALE),
 }

@@ -11,11 +11,12 @@ mean of 18 films, weighted by what they state: each has beads of its own.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, measured_rows
 from benchmarks.film_measurement import HARMLESS
 from benchmarks.true_collisions import counted, true_collision
 from nanorocks_ros.experiment.trays import load_trays
@@ -29,8 +30,7 @@ if TYPE_CHECKING:
     from benchmarks.true_collisions import TrueCollision
 
 _TRAYS = (1, 3)
-EXPONENTS = (0.0, 0.2, 0.6)
-"""Of the rows."""
+_EXPONENTS = (0.0, 0.2, 0.6)
 _FILMS, _TOGETHER = 40, 18
 _HEADER = (
     '\n| tray | exponent | films | unflagged | speed_dependent | exponents | mean error over '
@@ -43,21 +43,18 @@ _HEADER = (
 
 def report() -> None:
     """Make missing films, measure in all, and print the table."""
-    films = {
-        (tray, exponent): [
-            DrawnFilm(tray=tray, number=number, exponent=exponent)
-            for number in range(film_count(_FILMS))
-        ]
-        for exponent in EXPONENTS
+    rows = {
+        (tray, exponent): partial(_film, tray, exponent)
         for tray in _TRAYS
+        for exponent in _EXPONENTS
     }
-    draw([film for same in zip(*films.values(), strict=True) for film in same])
     print(_HEADER)
-    for tray in _TRAYS:
-        for exponent in EXPONENTS:
-            videos = [film.video for film in films[tray, exponent]]
-            read = measured([video for video in videos if video])
-            print(f'| {tray} | {exponent:g} | {_cells(read, exponent)} |', flush=True)
+    for (tray, exponent), read in measured_rows(rows, _FILMS):
+        print(f'| {tray} | {exponent:g} | {_cells(read, exponent)} |', flush=True)
+
+
+def _film(tray: int, exponent: float, number: int) -> DrawnFilm:
+    return DrawnFilm(tray=tray, number=number, exponent=exponent)
 
 
 def _cells(read: Sequence[ReadFilm], exponent: float) -> str:

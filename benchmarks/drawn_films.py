@@ -16,7 +16,7 @@ import os
 import pickle
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -34,9 +34,11 @@ from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_value
 from nanorocks_ros.studies.synthetic.drawn_film import write_drawn_film
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from nanorocks_ros.experiment.trays import Tray
+
+_Row = TypeVar('_Row')
 
 COUNT = 'NANOROCKS_FILM_COUNT'
 """Environment variable with the number of drawn films of each tray."""
@@ -137,6 +139,27 @@ def measured(videos: Sequence[Path]) -> list[ReadFilm]:
         )
         for video in videos
     ]
+
+
+def measured_rows(
+    rows: Mapping[_Row, Callable[[int], DrawnFilm]], films: int
+) -> Iterator[tuple[_Row, list[ReadFilm]]]:
+    """What is measured in the films of each row of a table.
+
+    Missing films are drawn before, number by number, so that an interrupted run has some of each.
+
+    Parameters
+    ----------
+    rows : mapping
+        From the key of a row to the film with a number.
+    films : int
+        Of a row, where ``NANOROCKS_FILM_COUNT`` does not say it.
+    """
+    numbers = range(film_count(films))
+    draw([film(number) for number in numbers for film in rows.values()])
+    for row, film in rows.items():
+        videos = [video for number in numbers if (video := film(number).video)]
+        yield row, measured(videos)
 
 
 def drawn_gas(

@@ -12,11 +12,12 @@ is wrong there is the theory of the rates.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, measured_rows
 from benchmarks.film_measurement import HARMLESS
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.sticking.sticking_cycle import sticking_cycle
@@ -48,22 +49,19 @@ _HEADER = (
 
 def report() -> None:
     """Make missing films, measure in all, and print the table."""
-    films = {
-        (tray, sticking): [
-            DrawnFilm(tray=tray, number=number, sticking=sticking)
-            for number in range(film_count(_FILMS))
-        ]
-        for sticking in _STICKING
+    rows = {
+        (tray, sticking): partial(_film, tray, sticking)
         for tray in _TRAYS
+        for sticking in _STICKING
     }
-    draw([film for same in zip(*films.values(), strict=True) for film in same])
     print(_HEADER)
-    for tray in _TRAYS:
-        for sticking in _STICKING:
-            videos = [film.video for film in films[tray, sticking]]
-            read = measured([video for video in videos if video])
-            name = f'{tray}, {1e3 * sticking:g} mm/s' if sticking else f'{tray}, never'
-            print(f'| {name} | {_cells(read)} |', flush=True)
+    for (tray, sticking), read in measured_rows(rows, _FILMS):
+        name = f'{tray}, {1e3 * sticking:g} mm/s' if sticking else f'{tray}, never'
+        print(f'| {name} | {_cells(read)} |', flush=True)
+
+
+def _film(tray: int, sticking: float, number: int) -> DrawnFilm:
+    return DrawnFilm(tray=tray, number=number, sticking=sticking)
 
 
 def _cells(read: Sequence[ReadFilm]) -> str:

@@ -10,11 +10,12 @@ half-width over that of the same film without drag and friction.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
 from benchmarks.coverage import coverage
-from benchmarks.drawn_films import DrawnFilm, ReadFilm, draw, film_count, measured
+from benchmarks.drawn_films import DrawnFilm, ReadFilm, measured_rows
 from nanorocks_ros.records import Interval
 
 _TRAYS = (1, 3)
@@ -32,15 +33,11 @@ _NAMES = ('restitution', 'wall_restitution')
 
 def report() -> None:
     """Make missing films, measure in all, and print the table."""
-    films = {
-        (tray, *row): [
-            DrawnFilm(tray=tray, number=number, drag=row[0], friction=row[1])
-            for number in range(film_count(_FILMS))
-        ]
-        for row in ROWS
+    rows = {
+        (tray, drag, friction): partial(_film, tray, drag, friction)
         for tray in _TRAYS
+        for drag, friction in ROWS
     }
-    draw([film for same in zip(*films.values(), strict=True) for film in same])
     print(
         '\n| tray | drag [1/s] | friction | drag found - true, sd of a film | final | unflagged | '
         'beads: holds, unflagged | half-width | over ideal | median error | '
@@ -48,15 +45,15 @@ def report() -> None:
         + '| --- ' * 14
         + '|'
     )
-    for tray in _TRAYS:
-        ideal: list[ReadFilm] = []
-        for drag, friction in ROWS:
-            videos = [film.video for film in films[tray, drag, friction]]
-            read = measured([video for video in videos if video])
-            ideal = ideal or read
-            print(
-                f'| {tray} | {drag:g} | {friction:g} | {_cells(read, ideal, drag)} |', flush=True
-            )
+    ideal: list[ReadFilm] = []
+    for (tray, drag, friction), read in measured_rows(rows, _FILMS):
+        if (drag, friction) == ROWS[0]:
+            ideal = read
+        print(f'| {tray} | {drag:g} | {friction:g} | {_cells(read, ideal, drag)} |', flush=True)
+
+
+def _film(tray: int, drag: float, friction: float, number: int) -> DrawnFilm:
+    return DrawnFilm(tray=tray, number=number, drag=drag, friction=friction)
 
 
 def _cells(read: list[ReadFilm], ideal: list[ReadFilm], drag: float) -> str:

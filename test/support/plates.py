@@ -70,3 +70,30 @@ def settings(**values):
         'preprocess.pixels_per_metre': SCALE,
     }
     return with_values(PipelineSettings(), {**common, **values}, 'test')
+
+
+class GrowingFloor:
+    """A bright floor in a dark wall, for a camera that zooms."""
+
+    shape = 200, 260
+    floor = 60, 50, 140, 100
+    wall = 7
+
+    def picture(self, number, rate, shift=(0.0, 0.0)):
+        """The picture with a number, which is by so much larger than the one before it."""
+        height, width = self.shape
+        x, y, across, down = self.floor
+        still = np.full((height, width, 3), 120.0)
+        wall = self.wall
+        still[y - wall : y + down + wall, x - wall : x + across + wall] = 40.0
+        still[y : y + down, x : x + across] = 180.0
+        still = cv2.GaussianBlur(still, (0, 0), 1.2)
+        centre = 0.5 * width + 5.0, 0.5 * height - 20.0
+        zoom = cv2.getRotationMatrix2D(centre, 0.0, 1.0 + rate * number)
+        zoom[:, 2] += shift
+        grown = cv2.warpAffine(still, zoom, (width, height), borderMode=cv2.BORDER_REPLICATE)
+        noise = np.random.default_rng(number).normal(0.0, 2.0, grown.shape)
+        return (grown + noise).round().clip(0, 255).astype(np.uint8)
+
+
+GROWING_FLOOR = GrowingFloor()

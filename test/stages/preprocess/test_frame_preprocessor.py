@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
+from plates import GROWING_FLOOR
 
 from nanorocks_ros.errors import ConfigurationError, FrameError
 from nanorocks_ros.pipeline.composition import trays_of
@@ -94,31 +94,17 @@ def test_a_frame_smaller_than_the_tray_is_refused():
 
 
 def test_a_zoom_is_said_once_and_flagged():
-    sides = (260, 200)
-    still = np.full((200, 260, 3), 120.0)
-    still[43:157, 53:207] = 40.0
-    still[50:150, 60:200] = 180.0
-    still = cv2.GaussianBlur(still, (0, 0), 1.2)
     stage = preprocessor(
         **{
             'preprocess.pixels_per_metre': 9000.0,
-            'preprocess.regions_px': [60, 50, 140, 100],
+            'preprocess.regions_px': list(GROWING_FLOOR.floor),
             'preprocess.check_tray_positions': False,
         }
     )
-    random = np.random.default_rng(4)
     said, images = [], []
     for number in range(150):
-        zoom = cv2.getRotationMatrix2D((135.0, 80.0), 0.0, 1.0 + 0.0002 * number)
-        picture = cv2.warpAffine(still, zoom, sides, borderMode=cv2.BORDER_REPLICATE)
-        noisy = picture + random.normal(0.0, 2.0, picture.shape)
-        records = stage.push(
-            Frame(
-                stamp_ns=number * NS // 30,
-                encoding='bgr8',
-                image=noisy.round().clip(0, 255).astype(np.uint8),
-            )
-        )
+        picture = GROWING_FLOOR.picture(number, 0.0002)
+        records = stage.push(Frame(stamp_ns=number * NS // 30, encoding='bgr8', image=picture))
         said += [record.text for record in records if isinstance(record, Notice)]
         images += [record for record in records if isinstance(record, TrayImage)]
     assert [text for text in said if 'zoom' in text] == [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from plates import SCALE, Plate
+from plates import GROWING_FLOOR, SCALE, Plate
 
 from nanorocks_ros.experiment.lens import Camera
 from nanorocks_ros.experiment.plate import Region
@@ -108,20 +108,11 @@ def test_writing_over_the_walls_that_does_not_move_does_not_hold_the_tray(plate,
 
 @pytest.mark.parametrize('rate', [0.0, 0.0002, -0.0002])
 def test_a_tray_that_grows_in_the_picture_is_noticed(rate):
-    sides = np.array([260, 200])
-    view = View(camera=IdentityLens(width=260, height=200))
-    tracker = TrayRegistration(Region(60, 50, 140, 100), view, 12.0, MIX)
-    still = np.full((200, 260, 3), 120.0)
-    still[43:157, 53:207] = 40.0
-    still[50:150, 60:200] = 180.0
-    still = cv2.GaussianBlur(still, (0, 0), 1.2)
-    random = np.random.default_rng(4)
-    for k, shift in enumerate(swing(150)):
-        zoom = cv2.getRotationMatrix2D((sides / 2 + (5, -20)).tolist(), 0.0, 1.0 + rate * k)
-        zoom[:, 2] += shift
-        picture = cv2.warpAffine(still, zoom, sides.tolist(), borderMode=cv2.BORDER_REPLICATE)
-        noisy = picture + random.normal(0.0, 2.0, picture.shape)
-        tracker.push(noisy.round().clip(0, 255).astype(np.uint8), None)
+    height, width = GROWING_FLOOR.shape
+    view = View(camera=IdentityLens(width=width, height=height))
+    tracker = TrayRegistration(Region(*GROWING_FLOOR.floor), view, 12.0, MIX)
+    for number, shift in enumerate(swing(150)):
+        tracker.push(GROWING_FLOOR.picture(number, rate, shift), None)
     assert tracker.grows == bool(rate)
 
 
