@@ -26,6 +26,7 @@ from nanorocks_ros.nodes.base.node import NanorocksNode
 from nanorocks_ros.pipeline.warm_up import warm_up, warm_up_counting, warm_up_speed
 from nanorocks_ros.settings import SimulationSettings
 from nanorocks_ros.simulation.tray_camera.tray_film import film
+from nanorocks_ros.tools.doctor.left_segments import remove_left_segments
 
 _PATIENCE_S = 40.0
 # Higher domains use ports that the system gives to other programs.
@@ -59,6 +60,13 @@ def compiled_simulation():
     warm_up()
     warm_up_counting()
     warm_up_speed()
+
+
+@pytest.fixture(scope='session', autouse=True)
+def _no_left_memory():
+    """Free the shared memory of nodes that tests killed: many runs fill that of the machine."""
+    yield
+    remove_left_segments()
 
 
 @dataclass

@@ -13,6 +13,7 @@ from nanorocks_ros.numerics.compilation.kernel_cache import cache_root
 from nanorocks_ros.settings import DashboardSettings
 from nanorocks_ros.tools.doctor import node_processes
 from nanorocks_ros.tools.doctor.findings import Finding, Status
+from nanorocks_ros.tools.doctor.left_segments import SHARED_MEMORY, left_bytes, removal_command
 from nanorocks_ros.tools.doctor.package_checks import pip_install
 
 _GB = 1e9
@@ -23,7 +24,6 @@ _RECOMMENDED_GB = 5.0
 _SEGMENT_GB = 0.064
 _SEGMENTS_GB = 0.5
 _FRAME_BYTES = 1920 * 1080 * 3
-_SHARED_MEMORY = Path('/dev/shm')
 _RECEIVE_BUFFER = Path('/proc/sys/net/core/rmem_max')
 
 
@@ -74,8 +74,11 @@ def live_page() -> Finding:
     return Finding(name=name, found=f'{where} is free')
 
 
-def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
-    """Free shared memory for the segments that carry frames between nodes."""
+def shared_memory(folder: Path = SHARED_MEMORY) -> Finding:
+    """Free shared memory for the segments that carry frames between nodes.
+
+    Nodes that are killed leave theirs until the machine starts again.
+    """
     name = 'shared memory'
     if not folder.is_dir():
         return Finding(
@@ -86,6 +89,14 @@ def shared_memory(folder: Path = _SHARED_MEMORY) -> Finding:
         )
     free = shutil.disk_usage(folder).free / _GB
     found = f'{free:.2f} GB free in {folder}'
+    left = left_bytes(folder) / _GB
+    if left >= _SEGMENTS_GB:
+        return Finding(
+            name=name,
+            status=Status.WARNING if free >= _SEGMENT_GB else Status.PROBLEM,
+            found=f'{found}; nodes that were killed left {left:.2f} GB there',
+            remedy=removal_command(folder),
+        )
     if free >= _SEGMENTS_GB and os.access(folder, os.W_OK):
         return Finding(name=name, found=found)
     blocked = free < _SEGMENT_GB or not os.access(folder, os.W_OK)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import importlib.metadata
 import re
 import shutil
@@ -83,6 +84,21 @@ def test_the_shared_memory_of_a_container_is_too_small(monkeypatch, tmp_path):
     assert_told('shared memory is full', finding)
     with_free(monkeypatch, int(size) * GB)
     assert machine_checks.shared_memory(tmp_path).status is Status.OK
+
+
+def test_what_killed_nodes_left_in_shared_memory_can_be_freed_while_others_run(tmp_path):
+    for name in ('of_a_killed_node', 'of_a_node'):
+        with (tmp_path / f'fastrtps_{name}').open('wb') as segment:
+            segment.truncate(GB)  # without blocks on the disk
+        (tmp_path / f'fastrtps_{name}_el').touch()
+    with (tmp_path / 'fastrtps_of_a_node_el').open('rb') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        finding = machine_checks.shared_memory(tmp_path)
+        assert finding.status is Status.WARNING
+        assert_told('killed nodes left shared memory', finding)
+        subprocess.run(['sh', '-c', finding.remedy], check=False)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {'fastrtps_of_a_node', 'fastrtps_of_a_node_el'}
 
 
 def test_small_socket_buffers_matter_between_machines_only(monkeypatch, tmp_path):
