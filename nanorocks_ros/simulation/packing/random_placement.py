@@ -123,7 +123,7 @@ def _filling(radii: NDArray[np.float64], box: NDArray[np.float64]) -> float:
 def pack_beads(
     radii: NDArray[np.float64],
     sides: NDArray[np.float64],
-    periodic: tuple[bool, bool, bool] | NDArray[np.bool_],
+    periodic: NDArray[np.bool_],
     key: np.uint64,
     most_tries: int,
 ) -> tuple[NDArray[np.float64], int]:
@@ -136,7 +136,7 @@ def pack_beads(
     ----------
     radii : ndarray (n,), [m]
     sides : ndarray (3,), [m]
-    periodic : three bools
+    periodic : ndarray of bool, (3,)
         Axes without walls. There, centres are in [0, side) and distances are those of the
         nearest images; elsewhere, beads are clear of both walls.
     key : uint64
@@ -166,7 +166,7 @@ def pack_beads(
 def _packing(
     radii: NDArray[np.float64],
     sides: NDArray[np.float64],
-    periodic: tuple[bool, bool, bool] | NDArray[np.bool_],
+    periodic: NDArray[np.bool_],
 ) -> Packing:
     """A packing of copies in fixed types, so that it is compiled once."""
     box = np.empty(3)

@@ -102,7 +102,10 @@ def library_decay(
         if in_window.sum() < 4:
             raise FitError(f'cycle {cycle.cycle}', 'is too short', 'choose a longer time')
         decay = cycle.times[in_window] - began, cycle.speed[in_window], cycle.error[in_window]
-        likelihoods.append(decay_likelihood(tables, *decay, camera, start_error=age.error))
+        # The figures assume smooth beads; likelihoods at frictions would take most of the time.
+        likelihoods.append(
+            decay_likelihood(tables, *decay, camera, highest_friction=0.0, start_error=age.error)
+        )
     together = reduce(add, likelihoods)
     integrated = together.integrated()
     low, high = walls or (prior.min_wall_restitution, prior.max_wall_restitution)

@@ -23,6 +23,7 @@ from nanorocks_ros.simulation.packing.random_placement import (
 )
 
 WALLS = (False, False, False)
+NONE_AROUND = np.array(WALLS)
 AROUND = (True, True, True)
 KEY = np.uint64(20190101)
 SEED = 1
@@ -93,7 +94,7 @@ def test_a_flown_tray_is_filled_one_bead_after_the_other(number):
     tray = load_trays()[number]
     radii, key = beads_of(tray, run=0)
     sides = np.array(tray.dimensions)
-    positions, placed = pack_beads(radii, sides, WALLS, key, MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, NONE_AROUND, key, MOST_TRIES)
     assert placed == tray.count
     np.testing.assert_array_equal(positions, one_after_the_other(radii, sides, WALLS, key))
 
@@ -102,7 +103,7 @@ def test_a_flown_tray_is_filled_one_bead_after_the_other(number):
 def test_random_sequential_insertion_of_many_sizes_in_a_periodic_box(periodic):
     radii = np.linspace(0.02, 1.0, 60) ** 2
     sides = cube_filled_to(0.25, radii) * [1.3, 1.0, 1.0 / 1.3]
-    positions, placed = pack_beads(radii, sides, periodic, KEY, MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, np.array(periodic), KEY, MOST_TRIES)
     assert placed == 60
     expected = one_after_the_other(radii, sides, periodic, KEY)
     np.testing.assert_array_equal(positions, expected)
@@ -239,7 +240,7 @@ def test_beads_of_any_sizes_in_any_box_never_overlap(sizes, shape, periodic, key
     radii = np.array(sizes)
     sides = cube_filled_to(0.15, radii) * np.array(shape)
     sides = np.maximum(sides, 2.001 * radii.max())
-    positions, placed = pack_beads(radii, sides, periodic, np.uint64(key), 100)
+    positions, placed = pack_beads(radii, sides, np.array(periodic), np.uint64(key), 100)
     assert placed == radii.size
     assert smallest_gap(positions, radii, sides, periodic) > -1e-12
 
@@ -285,7 +286,7 @@ def test_beads_for_which_there_is_no_room_are_refused_in_time(count, sides):
 def test_those_that_found_room_are_the_largest_and_have_valid_places():
     radii = np.linspace(0.3, 0.5, 60)
     sides = cube_filled_to(0.75, radii)
-    positions, placed = pack_beads(radii, sides, WALLS, KEY, MOST_TRIES)
+    positions, placed = pack_beads(radii, sides, NONE_AROUND, KEY, MOST_TRIES)
     assert 10 < placed < 60
     inside = np.argsort(radii)[-placed:]
     assert smallest_gap(positions[inside], radii[inside], sides, WALLS) > 0.0
@@ -325,7 +326,7 @@ def test_invalid_flags_are_refused(flags):
 @pytest.mark.parametrize('radius', [0.0, -0.5, math.nan, math.inf, 2.0])
 def test_compiled_code_places_no_bead_when_one_does_not_fit(radius):
     radii = np.array([0.5, radius, 0.5])
-    assert pack_beads(radii, np.full(3, 4.0), WALLS, KEY, 100)[1] == 0
+    assert pack_beads(radii, np.full(3, 4.0), NONE_AROUND, KEY, 100)[1] == 0
 
 
 @given(st.lists(st.integers(-4, 4)))

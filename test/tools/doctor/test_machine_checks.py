@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import importlib.metadata
+import pickle
 import re
 import shutil
 import socket
@@ -117,12 +118,28 @@ def test_small_socket_buffers_matter_between_machines_only(monkeypatch, tmp_path
     assert machine_checks.receive_buffer(limit).status is Status.OK
 
 
+PICKLE_FINDING = """
+import pickle
+import sys
+
+from nanorocks_ros.tools.doctor.machine_checks import compiled_kernels
+
+sys.stdout.buffer.write(pickle.dumps(compiled_kernels()))
+"""
+
+
+def kernels_of_a_new_process():
+    """A process decides once where it keeps kernels: here it would, for all tests that follow."""
+    command = [sys.executable, '-c', PICKLE_FINDING]
+    return pickle.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+
+
 def test_kernels_that_cannot_be_cached_are_found(monkeypatch, tmp_path):
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'new'))
-    assert machine_checks.compiled_kernels().status is Status.OK
+    assert kernels_of_a_new_process().status is Status.OK
     (tmp_path / 'file').write_text('')
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'file'))
-    finding = machine_checks.compiled_kernels()
+    finding = kernels_of_a_new_process()
     assert finding.status is Status.WARNING
     assert 'NUMBA_CACHE_DIR' in finding.remedy
     assert_told('compiled functions cannot be kept', finding)
@@ -258,7 +275,7 @@ def test_a_missing_profile_is_a_problem(monkeypatch):
         (ros_checks.profile, {RANGE: 'SUBNET'}),
         (ros_checks.profile, {RANGE: 'LOCALHOST', 'FASTDDS_DEFAULT_PROFILES_FILE': '/none'}),
         (lambda: ros_checks.executables(('pipeline',)), {'AMENT_PREFIX_PATH': '/none'}),
-        (machine_checks.compiled_kernels, {'NUMBA_CACHE_DIR': '/proc/none'}),
+        (kernels_of_a_new_process, {'NUMBA_CACHE_DIR': '/proc/none'}),
     ],
 )
 def test_the_advice_about_a_variable_removes_the_finding(monkeypatch, tmp_path, check, variables):
