@@ -101,16 +101,18 @@ def move_freely(
     inertia = inertia_of(arms, shares, radii)
     momentum = inertia @ spin
     inverse = np.linalg.inv(inertia)
-    turned = np.eye(3)
+    turned, slopes = np.empty((3, 3)), np.empty((5, 3, 3))
     # From the time 0 on, to either side.
     last = int(np.searchsorted(since, 0.0))
     for side in range(2):
-        turned[:] = np.eye(3)
+        for i in range(3):
+            for j in range(3):
+                turned[i, j] = 1.0 if i == j else 0.0
         time = 0.0
         count = since.size - last if side else last
         for number in range(count):
             n = last + number if side else last - 1 - number
-            _turn(turned, inverse, momentum, since[n] - time)
+            _turn(turned, inverse, momentum, since[n] - time, slopes)
             time = since[n]
             for k in range(len(arms)):
                 for i in range(2):
@@ -126,6 +128,7 @@ def _turn(
     inverse: NDArray[np.floating[Any]],
     momentum: NDArray[np.float64],
     time: float,
+    slopes: NDArray[np.float64],
 ) -> None:
     """Turn a rotation (3, 3) on for a time, [s], by the fourth-order rule of Runge and Kutta.
 
@@ -139,30 +142,53 @@ def _turn(
         Angular momentum.
     time : float, [s]
         Negative back in time.
+    slopes : ndarray (5, 3, 3)
+        Written: the last one is where a slope is taken.
     """
-    slope = _slope(turned, inverse, momentum)
-    angle = abs(time) * math.sqrt(0.5 * (slope * slope).sum())
-    steps = 1 + int(angle / _ANGLE)
+    trial = slopes[4]
+    _write_slope(turned, inverse, momentum, slopes[0])
+    square = 0.0
+    for i in range(3):
+        for j in range(3):
+            square += slopes[0, i, j] * slopes[0, i, j]
+    steps = 1 + int(abs(time) * math.sqrt(0.5 * square) / _ANGLE)
     step = time / steps
     for number in range(steps):
-        first = slope if number == 0 else _slope(turned, inverse, momentum)
-        second = _slope(turned + 0.5 * step * first, inverse, momentum)
-        third = _slope(turned + 0.5 * step * second, inverse, momentum)
-        fourth = _slope(turned + step * third, inverse, momentum)
-        turned += step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        if number:
+            _write_slope(turned, inverse, momentum, slopes[0])
+        for stage in range(1, 4):
+            part = step if stage == 3 else 0.5 * step
+            for i in range(3):
+                for j in range(3):
+                    trial[i, j] = turned[i, j] + part * slopes[stage - 1, i, j]
+            _write_slope(trial, inverse, momentum, slopes[stage])
+        for i in range(3):
+            for j in range(3):
+                middle = slopes[1, i, j] + slopes[2, i, j]
+                turned[i, j] += step / 6.0 * (slopes[0, i, j] + 2.0 * middle + slopes[3, i, j])
 
 
 @compiled
-def _slope(
+def _write_slope(
     turned: NDArray[np.float64],
     inverse: NDArray[np.floating[Any]],
     momentum: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Change of a rotation in time, (3, 3), [1/s]: the spin follows from the momentum."""
-    spin = turned @ (inverse @ (turned.T @ momentum))
-    slope = np.empty((3, 3))
+    slope: NDArray[np.float64],
+) -> None:
+    """Write the change (3, 3) of a rotation, [1/s]: the spin follows from the momentum."""
+    x, y, z = 0.0, 0.0, 0.0
     for j in range(3):
-        slope[0, j] = spin[1] * turned[2, j] - spin[2] * turned[1, j]
-        slope[1, j] = spin[2] * turned[0, j] - spin[0] * turned[2, j]
-        slope[2, j] = spin[0] * turned[1, j] - spin[1] * turned[0, j]
-    return slope
+        # Of the spin in axes that turn with the body.
+        own = 0.0
+        for k in range(3):
+            along = 0.0
+            for i in range(3):
+                along += turned[i, k] * momentum[i]
+            own += inverse[j, k] * along
+        x += turned[0, j] * own
+        y += turned[1, j] * own
+        z += turned[2, j] * own
+    for j in range(3):
+        slope[0, j] = y * turned[2, j] - z * turned[1, j]
+        slope[1, j] = z * turned[0, j] - x * turned[2, j]
+        slope[2, j] = x * turned[1, j] - y * turned[0, j]

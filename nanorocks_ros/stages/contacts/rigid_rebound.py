@@ -18,13 +18,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from nanorocks_ros.stages.contacts.rigid_motion import after_impulse, move_freely
+from nanorocks_ros.stages.contacts.rebound_residuals import (
+    arms_of,
+    derivatives_of,
+    residuals_of,
+    seen_body,
+)
+from nanorocks_ros.stages.contacts.rigid_motion import after_impulse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Error of the distance of two beads that touch, [m].
-_BOND_ERROR = 2e-5
 # Typical changes of the unknowns: places [m], velocities [m/s], spins [rad/s], times [s].
 _PLACE, _VELOCITY, _SPIN, _TIME = 1e-5, 1e-4, 0.1, 1e-2
 # Evaluations per unknown after which a fit is given up.
@@ -130,7 +134,7 @@ def rigid_rebound(frames: BodyFrames, first: int) -> RigidRebound | None:
     fit = _Fit(frames, first)
     try:
         solution = least_squares(
-            fit.residuals, fit.start, x_scale=fit.scale, method='lm',
+            fit.residuals, fit.start, jac=fit.derivatives, x_scale=fit.scale, method='lm',
             max_nfev=_EVALUATIONS * fit.start.size,
         )  # fmt: skip
     except (ValueError, np.linalg.LinAlgError):
@@ -158,21 +162,14 @@ def rigid_rebound(frames: BodyFrames, first: int) -> RigidRebound | None:
 
 
 class _Fit:
-    """Residuals of a body that rebounds between two frames.
-
-    Unknown are the places of the beads at the contact and their heights, velocity and spin before,
-    the impulse over the mass of the body, and the time of the contact.
-    """
+    """Residuals of a body that rebounds between two frames; see `rebound_residuals`."""
 
     def __init__(self, frames: BodyFrames, first: int) -> None:
         self._frames = frames
         self._before, self._following = slice(0, first), slice(first, frames.times.size)
-        self._normal = frames.normal
-        self._weights = 1.0 / frames.errors[:, :, np.newaxis]
-        self._shares = frames.masses / frames.masses.sum()
-        beads = frames.masses.size
-        self._bond = float(frames.radii.sum()) if beads == 2 else math.nan
-        places = np.full(3 * beads, _PLACE)
+        self._body = seen_body(frames, first)
+        self._shares, self._bond = self._body.shares, self._body.bond
+        places = np.full(3 * frames.masses.size, _PLACE)
         changes = [_VELOCITY] * 2 + [_SPIN] * 3 + [_VELOCITY, _TIME]
         self.scale = np.concatenate([places, changes])
         self.start = self._start(frames.times[first - 1 : first + 1].mean())
@@ -182,22 +179,18 @@ class _Fit:
         """Degrees of freedom: of the heights, the prior knows as much as there is to know."""
         beads = self._frames.masses.size
         heights = beads - 1 if math.isnan(self._bond) else 0
-        return int(2 * np.count_nonzero(self._weights) - (2 * beads + 7 + heights))
+        return int(2 * np.count_nonzero(self._body.weights) - (2 * beads + 7 + heights))
 
     def motion(self, unknowns: NDArray[np.float64]) -> _Motion:
         """The body by the unknowns of the fit."""
-        beads = self._frames.masses.size
-        places = unknowns[: 2 * beads].reshape(beads, 2)
-        heights = unknowns[2 * beads : 3 * beads]
-        centre = self._shares @ places
-        arms = np.column_stack([places - centre, heights - self._shares @ heights])
-        rest = unknowns[3 * beads :]
+        centre, arms = arms_of(unknowns, self._shares)
+        rest = unknowns[3 * self._frames.masses.size :]
         return _Motion(centre, arms, rest[:2], rest[2:5], float(rest[5]), float(rest[6]))
 
     def _after(self, motion: _Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocity and spin after the impulse of the wall."""
         frames = self._frames
-        turning = self._shares, frames.radii, frames.bead, self._normal
+        turning = self._shares, frames.radii, frames.bead, self._body.normal
         return after_impulse(motion.arms, motion.velocity, motion.spin, motion.impulse, turning)
 
     def _bead_velocity(
@@ -206,7 +199,7 @@ class _Fit:
         """Velocity of the centre of a bead along the normal into the tray, [m/s]."""
         turning = spin[1] * arm[2] - spin[2] * arm[1], spin[2] * arm[0] - spin[0] * arm[2]
         axis = self._frames.axis
-        return float(velocity[axis] + turning[axis]) * float(self._normal[axis])
+        return float(velocity[axis] + turning[axis]) * float(self._body.normal[axis])
 
     def speeds(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Normal speeds of the contact before and after, (2,), [m/s]."""
@@ -225,37 +218,17 @@ class _Fit:
             columns.append(difference / (2.0 * change))
         return np.column_stack(columns)
 
-    def _deviations(self, motion: _Motion) -> NDArray[np.float64]:
-        frames = self._frames
-        after, spin_after = self._after(motion)
-        expected = np.empty(frames.positions.shape)
-        for rows, velocity, spin in (
-            (self._before, motion.velocity, motion.spin),
-            (self._following, after, spin_after),
-        ):
-            move_freely(
-                (motion.centre, motion.arms),
-                (self._shares, frames.radii),
-                (velocity, spin),
-                frames.times[rows] - motion.time,
-                expected[rows],
-            )
-        return np.asarray((expected - frames.positions) * self._weights)
-
     def residuals(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deviations of all positions, heights and the bond, in their errors."""
-        motion = self.motion(unknowns)
-        beads = self._frames.masses.size
-        heights = unknowns[2 * beads : 3 * beads] / self._frames.spread
-        parts = [self._deviations(motion).ravel(), heights]
-        if not math.isnan(self._bond):
-            distance = np.linalg.norm(motion.arms[1] - motion.arms[0])
-            parts.append(np.array([(distance - self._bond) / _BOND_ERROR]))
-        return np.concatenate(parts)
+        return residuals_of(self._body, unknowns)
+
+    def derivatives(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of the residuals by the unknowns."""
+        return derivatives_of(self._body, unknowns, self.scale * _STEP)
 
     def chi_square(self, unknowns: NDArray[np.float64]) -> float:
         """Of the positions alone."""
-        return float((self._deviations(self.motion(unknowns)) ** 2).sum())
+        return float((self.residuals(unknowns)[: self._body.positions.size] ** 2).sum())
 
     def _start(self, time: float) -> NDArray[np.float64]:
         """First values of the unknowns, from straight lines through each bead."""
@@ -264,7 +237,7 @@ class _Fit:
         )
         places = 0.5 * (place + place_after)
         velocity = self._shares @ slope
-        impulse = float((self._shares @ slope_after - velocity) @ self._normal[:2])
+        impulse = float((self._shares @ slope_after - velocity) @ self._body.normal[:2])
         heights, spin = self._heights_and_spin(places, slope - velocity)
         return np.concatenate([places.ravel(), heights, velocity, spin, [impulse, time]])
 
