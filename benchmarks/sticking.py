@@ -1,24 +1,27 @@
 """Bodies, sizes, first merges and sticking speeds from tracks, against the truth.
 
 True positions at 30 Hz with errors as in tracking, 58 s after a shaking event at
-10 mm/s. Tracks of films are in `sticking_films`.
+10 mm/s. Tracks of films are in `sticking_films`. False merges are counted in gases that are drawn
+from the priors, as those of `drawn_films`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import binomtest
 
 from benchmarks.contacts import tracks_of
+from benchmarks.drawn_films import drawn_gas
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import sticking_estimate
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.physics.sticking_rates import slow_contacts
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
-from nanorocks_ros.settings import PipelineSettings, SimulationSettings
+from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 
@@ -28,8 +31,7 @@ _SPEED = 0.010
 _TRAYS = (1, 3, 5)
 _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
 _CYCLES = 6
-_CONTROLS = 7
-_CONTROL_TRUTHS = [(pairs, walls) for pairs in (0.5, 0.7, 0.89, 0.95) for walls in (0.9, 0.97)]
+_CONTROLS = 300
 _NS = 1e9
 
 
@@ -97,9 +99,15 @@ def simulated(
     number: int, run: int, seed: int = 5, seconds: float = _SECONDS, **values: float | str
 ) -> Course:
     """One cycle of a tray with true positions."""
-    tray = load_trays()[number]
     names = {'restitution': 0.89, 'wall_restitution': 0.97, 'mean_speed': _SPEED, **values}
-    settings = SimulationSettings(seed=seed, first_shake=0.0, frame_rate=_RATE, **names)
+    return _simulated(load_trays()[number], run, seed, seconds, names)
+
+
+def _simulated(
+    tray: Tray, run: int, seed: int, seconds: float, values: Mapping[str, float | str]
+) -> Course:
+    cycle = {'seed': seed, 'first_shake': 0.0, 'frame_rate': _RATE}
+    settings = with_values(SimulationSettings(), {**values, **cycle}, 'benchmark')
     gas = ShakenTray(settings, tray, run)
     rng = np.random.default_rng([seed, run])
     pictures = tracks_of(gas, tray, rng, round(seconds * _RATE))
@@ -110,23 +118,18 @@ def simulated(
 
 
 def _report_controls() -> None:
-    print('\nControls without sticking: restitutions 0.5 to 0.95, walls 0.9 and 0.97\n')
-    print('| tray | cycles | with a false merge |')
-    print('| --- | --- | --- |')
-    tasks = {
-        f'{number} {pairs} {walls} {run}': (number, pairs, walls, run)
-        for number in _TRAYS
-        for pairs, walls in _CONTROL_TRUTHS
-        for run in range(_CONTROLS)
-    }
-    alarms = run_tasks(_false_alarm, tasks, Workers())
-    for number in _TRAYS:
-        tray_alarms = [
-            alarm
-            for (tray_number, *_), alarm in zip(tasks.values(), alarms, strict=True)
-            if tray_number == number
-        ]
-        print(f'| {number} | {len(tray_alarms)} | {sum(tray_alarms)} |', flush=True)
+    print('\nGases without sticking, drawn from the priors\n')
+    print('| tray | cycles | with a false merge | 95 % |')
+    print('| --- | --- | --- | --- |')
+    tasks = {f'{number} {run}': (number, run) for number in _TRAYS for run in range(_CONTROLS)}
+    alarms = np.reshape(run_tasks(_false_alarm, tasks, Workers()), (len(_TRAYS), _CONTROLS))
+    for number, tray_alarms in zip(_TRAYS, alarms, strict=True):
+        limits = binomtest(int(tray_alarms.sum()), _CONTROLS).proportion_ci(method='exact')
+        print(
+            f'| {number} | {_CONTROLS} | {tray_alarms.sum()} '
+            f'| {limits.low:.1%} to {limits.high:.1%} |',
+            flush=True,
+        )
 
 
 def compared(cycle: Course) -> tuple[np.ndarray, ...]:
@@ -255,10 +258,10 @@ def _cycle_of(task: tuple[int, float, int]) -> Course:
     return simulated(number, run, sticking_speed=speed)
 
 
-def _false_alarm(task: tuple[int, float, float, int]) -> bool:
-    number, pairs, walls, run = task
-    gas = simulated(number, run, 7, restitution=pairs, wall_restitution=walls)
-    return bool(gas.merges)
+def _false_alarm(task: tuple[int, int]) -> bool:
+    number, run = task
+    tray, values = drawn_gas(number, run, 0.0, 0.0)
+    return bool(_simulated(tray, run, 7, _SECONDS, values).merges)
 
 
 def report() -> None:

@@ -26,13 +26,15 @@ _BOX_AREA = 16.0
 # and starts with even speeds are peaked. Together with the next number it is not below what gases
 # without sticking show, restitutions 0.5 to 0.95 (`python -m benchmarks sticking`).
 _PEAKED = 7.0
+# Where beads cover more of the floor, those around a pair keep it together: shares of the floor,
+# and two ways in which others part a pair there.
+_COVERED = 0.25, 0.30
 # Collisions that part two neighbours, with each other and with others, per encounter of a bead
 # and relative path: 2 in simulated trays 3, 1 in trays 5.
-_DISTURBED = 1.3
+_DISTURBED = 1.3, 0.85
 # Collisions that part two neighbours whose distance may vary, per collision of either bead; others
-# leave them beside each other: 0.85 in gases of free beads in tray 3. Where beads cover more of
-# the floor, those around a pair keep it together: shares of the floor, and collisions that part.
-_COVERED, _PARTING = (0.25, 0.30), (0.75, 0.5)
+# leave them beside each other: 0.85 in gases of free beads in tray 3.
+_PARTING = 0.75, 0.4
 # Heights of the centres of two beads, for mean widths: nodes of a midpoint rule.
 _HEIGHTS = (np.arange(32) + 0.5) / 32
 # Radii at which collision rates are worked out.
@@ -53,6 +55,11 @@ def encounter_rate(tray: Tray) -> float:
     return float(2.0 * math.sqrt(2.0) * reach * max(counts.sum() - 1.0, 0.0) / room)
 
 
+def parting_rate(tray: Tray) -> float:
+    """Encounters that part two neighbours whose separation is constant, per path, [1/m]."""
+    return float(np.interp(_covered_share(tray), _COVERED, _DISTURBED)) * encounter_rate(tray)
+
+
 def chance_probability(
     path: ArrayLike, tolerance: ArrayLike, rate: float, collision_path: ArrayLike | None = None
 ) -> NDArray[np.float64]:
@@ -66,7 +73,7 @@ def chance_probability(
     tolerance : array_like, [m]
         Half of the range within which a component of their separation stayed.
     rate : float, [1/m]
-        From `encounter_rate`.
+        From `parting_rate`.
     collision_path : array_like, [m], optional
         The path on which others may hit them, at the speed of the gas at each time; as `path` when
         not given. A free pair keeps the speed it met with, though the gas around it cools.
@@ -76,9 +83,7 @@ def chance_probability(
     ndarray, 0 to 1
     """
     area = _BOX_AREA * np.square(tolerance)
-    return _chance(
-        path, area, _DISTURBED * rate, path if collision_path is None else collision_path
-    )
+    return _chance(path, area, rate, path if collision_path is None else collision_path)
 
 
 class CollisionRate:
@@ -123,10 +128,14 @@ class CollisionRate:
 
 def parting_share(tray: Tray) -> float:
     """Share of the collisions of two neighbours that part them, while their distance may vary."""
+    return float(np.interp(_covered_share(tray), _COVERED, _PARTING))
+
+
+def _covered_share(tray: Tray) -> float:
+    """Share of the floor that beads cover."""
     radii = np.array([0.5 * species.diameter for species in tray.species])
     counts = np.array([species.count for species in tray.species], dtype=np.float64)
-    covered = math.pi * (counts @ radii**2) / math.prod(tray.dimensions[:2])
-    return float(np.interp(covered, _COVERED, _PARTING))
+    return math.pi * float(counts @ radii**2) / math.prod(tray.dimensions[:2])
 
 
 def _mean_width(radii: NDArray[np.float64], radius: float, height: float) -> NDArray[np.float64]:

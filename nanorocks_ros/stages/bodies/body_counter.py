@@ -12,6 +12,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     CollisionRate,
     encounter_rate,
     max_chance_probability,
+    parting_rate,
     parting_share,
 )
 from nanorocks_ros.records import BodyEstimate, Merge, Tracks
@@ -81,7 +82,7 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         # to be uncertain: grains beside each other would look bonded.
         self._has_grains = any(kind.properties.shape == 'grain' for kind in tray.species)
         self._bond_finder = BondFinder(
-            self._encounter_rate, CollisionRate(tray), parting_share(tray)
+            parting_rate(tray), CollisionRate(tray), parting_share(tray)
         )
         self.reset()
 
@@ -98,7 +99,7 @@ class BodyCounter(RestartingStage[Tracks, BodyEstimate | Merge]):
         self._bond_finder.clear()
         self._occluded = OccludedBeads()
         self._reappearing = ReappearingBeads()
-        self._comoving = ComovingBodies(self._encounter_rate)
+        self._comoving = ComovingBodies(parting_rate(self._tray))
         self._bonds: dict[tuple[int, int], Bond] = {}
         self._possible_doubles: list[Bond] = []
         self._n_joins = 0

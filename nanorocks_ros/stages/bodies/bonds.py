@@ -81,7 +81,7 @@ class BondFinder:
     Parameters
     ----------
     rate : float, [1/m]
-        Encounters of a bead per path length, from `encounter_rate`.
+        Encounters that part a pair, per path, from `parting_rate`.
     collision_rate : callable
         Collisions of pairs per path: a `CollisionRate`.
     parting : float

@@ -55,7 +55,7 @@ class ComovingBodies:
     Parameters
     ----------
     rate : float, [1/m]
-        Encounters of a bead per path length, from `encounter_rate`.
+        Encounters that part a pair, per path, from `parting_rate`.
     """
 
     def __init__(self, rate: float) -> None:

@@ -10,9 +10,9 @@ from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.inference.sticking.chance_proximity import (
     CollisionRate,
     chance_probability,
-    encounter_rate,
     expected_encounters,
     max_chance_probability,
+    parting_rate,
     parting_share,
     turning_chance_probability,
 )
@@ -20,7 +20,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
 
 def test_free_beads_are_less_likely_to_stay_together_over_a_longer_path():
     probability = chance_probability(
-        np.array([0.0, 1e-3, 2e-3, 4e-3]), 2e-5, encounter_rate(load_trays()[1])
+        np.array([0.0, 1e-3, 2e-3, 4e-3]), 2e-5, parting_rate(load_trays()[1])
     )
     assert probability[0] == 1.0
     assert (np.diff(probability) < 0.0).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.sticking.chance_proximity import encounter_rate
+from nanorocks_ros.inference.sticking.chance_proximity import parting_rate
 from nanorocks_ros.records import Tracks
 from nanorocks_ros.stages.bodies.comoving_bodies import ComovingBodies
 from nanorocks_ros.stages.bodies.reappearing_beads import ReappearingBeads
@@ -21,7 +21,7 @@ POSITIONS = np.array([(0.0, 0.0), (1e-3, 0.0), (2.8e-3, 0.0), (3.8e-3, 0.0)])
 
 def _bonds(drift, *, hidden):
     """Bonds found in 3 s at 1 mm/s; the bodies drift apart at a speed."""
-    comoving = ComovingBodies(encounter_rate(TRAY))
+    comoving = ComovingBodies(parting_rate(TRAY))
     rng = np.random.default_rng(1)
     bonds = []
     for k in range(90):
