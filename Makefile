@@ -89,9 +89,11 @@ ONCE := test/golden test/validation test/simulation test/inference test/stages t
 dependencies-oldest:
 	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt own dependencies
 
+# Two processes of tests, and what these start, would compile the same functions side by side.
+OLDEST_CACHE := NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba"
 test-oldest: ## Run the tests of the core, without ROS, with the oldest dependencies
-	@sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt
-	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$(CURDIR)/$(OLDEST)/numba" \
+	@$(OLDEST_CACHE) sh requirements/set_up.sh $(OLDEST) requirements/oldest.txt own compile
+	@env -u PYTHONPATH OPENBLAS_NUM_THREADS=1 $(OLDEST_CACHE) \
 	    PATH="$(CURDIR)/$(OLDEST)/bin:$$PATH" python -m pytest \
 	    $(SIDE_BY_SIDE) $(patsubst %,--ignore=%,$(NODES) $(ONCE)) -k 'not at_any_step' $(PYTEST_ARGS)
 
