@@ -9,7 +9,7 @@ Tested by ``test/stages/contacts/test_body_rebounds.py``.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,12 @@ from numpy.typing import NDArray
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.stages.contacts.rigid_motion import after_impulse, move_freely
 
-if TYPE_CHECKING:
-    from nanorocks_ros.stages.contacts.rigid_rebound import BodyFrames
-
 # Error of the distance of two beads that touch, [m].
 _BOND_ERROR = 2e-5
 
 
 class SeenBody(NamedTuple):
-    """What is known of a body; see `BodyFrames`.
+    """What frames tell of a body that touches a wall; see `BodyFrames` of `rigid_rebound`.
 
     Parameters
     ----------
@@ -56,22 +53,6 @@ class SeenBody(NamedTuple):
     normal: NDArray[np.float64]
     spread: float
     bond: float
-
-
-def seen_body(frames: BodyFrames, first: int) -> SeenBody:
-    """What some frames tell of a body that touches the wall before the row `first`."""
-    return SeenBody(
-        times=frames.times,
-        first=first,
-        positions=frames.positions,
-        weights=1.0 / frames.errors,
-        shares=frames.masses / frames.masses.sum(),
-        radii=frames.radii,
-        bead=frames.bead,
-        normal=frames.normal,
-        spread=frames.spread,
-        bond=float(frames.radii.sum()) if frames.radii.size == 2 else math.nan,
-    )
 
 
 def residuals_of(body: SeenBody, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,10 +19,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from nanorocks_ros.stages.contacts.rebound_residuals import (
+    SeenBody,
     arms_of,
     derivatives_of,
     residuals_of,
-    seen_body,
 )
 from nanorocks_ros.stages.contacts.rigid_motion import after_impulse
 
@@ -161,13 +161,29 @@ def rigid_rebound(frames: BodyFrames, first: int) -> RigidRebound | None:
     )
 
 
+def _seen_body(frames: BodyFrames, first: int) -> SeenBody:
+    """What some frames tell of a body that touches the wall before the row `first`."""
+    return SeenBody(
+        times=frames.times,
+        first=first,
+        positions=frames.positions,
+        weights=1.0 / frames.errors,
+        shares=frames.masses / frames.masses.sum(),
+        radii=frames.radii,
+        bead=frames.bead,
+        normal=frames.normal,
+        spread=frames.spread,
+        bond=float(frames.radii.sum()) if frames.radii.size == 2 else math.nan,
+    )
+
+
 class _Fit:
     """Residuals of a body that rebounds between two frames; see `rebound_residuals`."""
 
     def __init__(self, frames: BodyFrames, first: int) -> None:
         self._frames = frames
         self._before, self._following = slice(0, first), slice(first, frames.times.size)
-        self._body = seen_body(frames, first)
+        self._body = _seen_body(frames, first)
         self._shares, self._bond = self._body.shares, self._body.bond
         places = np.full(3 * frames.masses.size, _PLACE)
         changes = [_VELOCITY] * 2 + [_SPIN] * 3 + [_VELOCITY, _TIME]
