@@ -11,7 +11,11 @@ import numpy as np
 from nanorocks_ros.records import NS, Measured, Merge, Rebound, Tracks
 from nanorocks_ros.stages.bodies.body_sizes import bodies_of
 from nanorocks_ros.stages.contacts.pair_tests import MIN_SIGNAL
-from nanorocks_ros.stages.contacts.rigid_rebound import BodyFrames, RigidRebound, rigid_rebound
+from nanorocks_ros.stages.contacts.rigid_bodies.rigid_rebound import (
+    BodyFrames,
+    RigidRebound,
+    rigid_rebound,
+)
 from nanorocks_ros.stages.flights.relative_drag import relative_drag
 from nanorocks_ros.stages.stage import RestartingStage
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from nanorocks_ros.stages.contacts.rigid_motion import inertia_of, move_freely
+from nanorocks_ros.stages.contacts.rigid_bodies.rigid_motion import inertia_of, move_freely
 
 SINCE = np.linspace(-0.5, 0.5, 31)
 RADIUS = 1e-3

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nanorocks_ros.numerics.compiled import compiled
-from nanorocks_ros.stages.contacts.rigid_motion import after_impulse, move_freely
+from nanorocks_ros.stages.contacts.rigid_bodies.rigid_motion import after_impulse, move_freely
 
 # Error of the distance of two beads that touch, [m].
 _BOND_ERROR = 2e-5

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from nanorocks_ros.stages.contacts.rebound_residuals import (
+from nanorocks_ros.stages.contacts.rigid_bodies.rebound_residuals import (
     SeenBody,
     arms_of,
     derivatives_of,
     residuals_of,
 )
-from nanorocks_ros.stages.contacts.rigid_motion import after_impulse
+from nanorocks_ros.stages.contacts.rigid_bodies.rigid_motion import after_impulse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
