@@ -111,7 +111,7 @@ def test_a_tray_that_grows_in_the_picture_is_noticed(rate):
     height, width = GROWING_FLOOR.shape
     view = View(camera=IdentityLens(width=width, height=height))
     tracker = TrayRegistration(Region(*GROWING_FLOOR.floor), view, 12.0, MIX)
-    for number, shift in enumerate(swing(150)):
+    for number, shift in enumerate(swing(200)):
         tracker.push(GROWING_FLOOR.picture(number, rate, shift), None)
     assert tracker.grows == bool(rate)
 
