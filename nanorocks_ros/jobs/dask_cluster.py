@@ -133,7 +133,10 @@ def _connected(scheduler: str) -> Iterator[Any]:
     # In a thread, since this one may run an event loop, as in a notebook.
     with ThreadPoolExecutor(1) as thread:
         thread.submit(asyncio.run, _await_scheduler(scheduler)).result()
-    client = Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+    try:
+        client = Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+    except (OSError, *_TIMEOUT_ERRORS) as error:
+        raise _no_answer(scheduler) from error
     try:
         yield client
     finally:
@@ -149,11 +152,15 @@ async def _await_scheduler(address: str) -> None:
         async with rpc(address) as scheduler:
             await asyncio.wait_for(scheduler.identity(), _CONNECT_TIMEOUT)
     except (OSError, *_TIMEOUT_ERRORS) as error:
-        raise NanorocksError(
-            address,
-            f'no Dask scheduler answers within {_CONNECT_TIMEOUT:g} s',
-            'start one with: dask scheduler',
-        ) from error
+        raise _no_answer(address) from error
+
+
+def _no_answer(address: str) -> NanorocksError:
+    return NanorocksError(
+        address,
+        f'no Dask scheduler answers within {_CONNECT_TIMEOUT:g} s',
+        'start one with: dask scheduler',
+    )
 
 
 def _await_workers(client: Any, scheduler: str, seconds: float) -> None:

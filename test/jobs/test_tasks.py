@@ -175,9 +175,9 @@ def test_a_cluster_without_workers_is_told_before_and_during_the_work(scheduler,
     for name in ('_CHECK_INTERVAL', '_NEW_WORKER_TIMEOUT'):
         monkeypatch.setattr(cluster_module, name, 1.0)
     # In it a busy machine has to connect, too.
-    monkeypatch.setattr(cluster_module, '_CONNECT_TIMEOUT', 4.0)
+    monkeypatch.setattr(cluster_module, '_CONNECT_TIMEOUT', 8.0)
     workers = Workers(scheduler=scheduler.address)
-    with pytest.raises(NanorocksError, match=r'no workers for 4 s; .* dask worker tcp://'):
+    with pytest.raises(NanorocksError, match=r'no workers for 8 s; .* dask worker tcp://'):
         workers.check()
     scheduler.add_worker()
     scheduler.await_workers()
