@@ -182,7 +182,6 @@ class _Fit:
 
     def __init__(self, frames: BodyFrames, first: int) -> None:
         self._frames = frames
-        self._before, self._following = slice(0, first), slice(first, frames.times.size)
         self._body = _seen_body(frames, first)
         self._shares, self._bond = self._body.shares, self._body.bond
         places = np.full(3 * frames.masses.size, _PLACE)
@@ -249,7 +248,8 @@ class _Fit:
     def _start(self, time: float) -> NDArray[np.float64]:
         """First values of the unknowns, from straight lines through each bead."""
         (place, slope), (place_after, slope_after) = (
-            self._lines(rows, time) for rows in (self._before, self._following)
+            self._lines(rows, time)
+            for rows in (slice(0, self._body.first), slice(self._body.first, None))
         )
         places = 0.5 * (place + place_after)
         velocity = self._shares @ slope
