@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.cli.progress_bar import Progress
+from nanorocks_ros.jobs.interruption import interruption_says
 
 if TYPE_CHECKING:
     import argparse
@@ -42,17 +43,18 @@ def run(options: argparse.Namespace) -> int:
     processes = Workers(processes=options.workers).count
     listed = listed_versions()
     missing = missing_versions(listed)
+
+    def kept() -> str:
+        left = len(missing_versions(missing))
+        return (
+            f'{len(listed) - left} of {len(listed)} functions are compiled and stay in '
+            f'{kernels_folder()}; the same command compiles the others'
+        )
+
     made = Compilation(functions=0, seconds=0.0, processor_seconds=0.0, faults=())
     if missing:
-        with Progress('compiling functions') as progress:
-            try:
-                made = compile_versions(missing, processes, progress.count)
-            except KeyboardInterrupt:
-                left = len(missing_versions(missing))
-                raise KeyboardInterrupt(
-                    f'{len(listed) - left} of {len(listed)} functions are compiled and stay in '
-                    f'{kernels_folder()}; the same command compiles the others'
-                ) from None
+        with interruption_says(kept), Progress('compiling functions') as progress:
+            made = compile_versions(missing, processes, progress.count)
     if options.json:
         summary = {
             'functions': len(listed),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nanorocks_ros.cli.notices import tell
+from nanorocks_ros.jobs.interruption import interruption_says
 
 if TYPE_CHECKING:
     import argparse
@@ -91,11 +92,9 @@ def _recording(name: str) -> str:
     from nanorocks_ros.outputs.safe_text import printable
     from nanorocks_ros.studies.film_import.film_cache import cached_import
 
-    try:
-        with Progress('importing') as progress:
-            film = cached_import(Path(name), progress.part)
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('run the same command again to import the film') from interruption
+    again = interruption_says('run the same command again to import the film')
+    with again, Progress('importing') as progress:
+        film = cached_import(Path(name), progress.part)
     for notice in film.notices:
         tell(notice)
     how = 'its import is used' if film.reused else 'imported'

@@ -6,6 +6,7 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.jobs.journal import Journal
 from nanorocks_ros.jobs.tasks import as_completed
 from nanorocks_ros.outputs.npz_archive import read_archive
@@ -120,14 +121,15 @@ def fill_journal(
     missing = {key: task for key, task in tasks.items() if key not in finished}
     done = len(tasks) - len(missing)
     report(done, len(tasks))
-    try:
-        with closing(as_completed(function, missing, workers)) as results:
-            for key, arrays in results:
-                journal.write(key, arrays)
-                done += 1
-                report(done, len(tasks))
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(
+
+    def kept() -> str:
+        return (
             f'{len(journal.keys())} of {len(tasks)} parts are kept in {journal.folder}; the same '
             'command goes on from there'
-        ) from None
+        )
+
+    with interruption_says(kept), closing(as_completed(function, missing, workers)) as results:
+        for key, arrays in results:
+            journal.write(key, arrays)
+            done += 1
+            report(done, len(tasks))

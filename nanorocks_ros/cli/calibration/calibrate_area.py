@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.outputs.json_values import finite_or_none
 
 if TYPE_CHECKING:
@@ -62,18 +63,15 @@ def run(options: argparse.Namespace) -> int:
     settings, assumed, _ = bag_settings(options, options.bag)
     _check_outputs(options, settings)
     manual = read_manual_tracks(options.tracks)
-    try:
-        with Progress('measuring') as progress:
-            calibration = calibrate_area(
-                Path(options.bag),
-                manual,
-                settings,
-                first_frame=options.first_frame,
-                image_topic=options.image_topic,
-                progress=progress.count,
-            )
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('nothing was written') from interruption
+    with interruption_says('nothing was written'), Progress('measuring') as progress:
+        calibration = calibrate_area(
+            Path(options.bag),
+            manual,
+            settings,
+            first_frame=options.first_frame,
+            image_topic=options.image_topic,
+            progress=progress.count,
+        )
     refused = (str(error) for error in calibration.refused.values())
     print_notices((*assumed, *calibration.notices, *refused), options)
     if options.json:

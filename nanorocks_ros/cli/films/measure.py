@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,10 +93,8 @@ def run(options: argparse.Namespace) -> int:
         workers=Workers(processes=options.workers),
         name_files=partial(with_own_files, options=options),
     )
-    try:
+    with interruption_says('the same command continues'):
         measured = measure_film(plan, _Terminal(options))
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('the same command continues') from interruption
     if options.json:
         values = {str(tray.number): tray.as_json() for tray in measured.trays}
         print(json.dumps({'usable': measured.usable, 'trays': values}, allow_nan=False))

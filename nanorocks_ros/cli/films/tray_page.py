@@ -13,6 +13,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -87,10 +88,8 @@ def described_in_browser(options: argparse.Namespace, samples: FilmSamples) -> R
         saved.append(tray)
         return str(options.output)
 
-    try:
+    with interruption_says('nothing was written'):
         FilmServer(samples.frames, options.named[0], recognise, write).run()
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('nothing was written') from interruption
     return saved[-1]
 
 

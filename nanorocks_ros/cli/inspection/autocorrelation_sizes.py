@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.outputs.json_values import json_values
 
 if TYPE_CHECKING:
@@ -52,17 +53,14 @@ def run(options: argparse.Namespace) -> int:
     kinds = {'--output': ('.png', '.pdf', '.svg'), '--table': ('.csv',)}
     check_outputs(files, kinds, force=options.force)
     settings, assumed, _ = bag_settings(options, options.bag)
-    try:
-        with Progress('measuring') as progress:
-            clusters = cycle_clusters(
-                Path(options.bag),
-                settings,
-                cycle=options.cycle,
-                image_topic=options.image_topic,
-                progress=progress.count,
-            )
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('nothing was written') from interruption
+    with interruption_says('nothing was written'), Progress('measuring') as progress:
+        clusters = cycle_clusters(
+            Path(options.bag),
+            settings,
+            cycle=options.cycle,
+            image_topic=options.image_topic,
+            progress=progress.count,
+        )
     print_notices((*assumed, *clusters.notices), options)
     if '--table' in files:
         write_clusters(files['--table'], clusters)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.outputs.json_values import finite_or_none
 
 if TYPE_CHECKING:
@@ -57,18 +58,15 @@ def run(options: argparse.Namespace) -> int:
             {'--output': Path(options.output)}, {'--output': ('.png',)}, force=options.force
         )
     settings, assumed, _ = bag_settings(options, options.bag)
-    try:
-        with Progress('looking') as progress:
-            steps = steps_of_bag(
-                Path(options.bag),
-                settings,
-                number=options.frame,
-                time=options.at,
-                image_topic=options.image_topic,
-                progress=progress.count,
-            )
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('nothing was written') from interruption
+    with interruption_says('nothing was written'), Progress('looking') as progress:
+        steps = steps_of_bag(
+            Path(options.bag),
+            settings,
+            number=options.frame,
+            time=options.at,
+            image_topic=options.image_topic,
+            progress=progress.count,
+        )
     print_notices((*assumed, *steps.notices), options)
     if options.json:
         print(json.dumps(_as_json(steps), allow_nan=False))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.outputs.json_values import json_values
 
 if TYPE_CHECKING:
@@ -51,16 +52,13 @@ def run(options: argparse.Namespace) -> int:
     files = {flag: Path(name) for flag, name in names.items() if name}
     check_outputs(files, {'--output': ('.png',), '--table': ('.csv',)}, force=options.force)
     settings, assumed, _ = bag_settings(options, options.bag)
-    try:
-        with Progress('measuring') as progress:
-            speeds = compare_speeds(
-                Path(options.bag),
-                settings,
-                image_topic=options.image_topic,
-                progress=progress.count,
-            )
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt('nothing was written') from interruption
+    with interruption_says('nothing was written'), Progress('measuring') as progress:
+        speeds = compare_speeds(
+            Path(options.bag),
+            settings,
+            image_topic=options.image_topic,
+            progress=progress.count,
+        )
     print_notices((*assumed, *speeds.notices), options)
     cycle = _cycle(speeds, options.cycle)
     if options.json:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.cli.flags import SHORT_FLAGS, add_flag, settings_from
 from nanorocks_ros.cli.notices import tell
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.settings import PipelineSettings, rows
 
 if TYPE_CHECKING:
@@ -169,14 +170,10 @@ def _run_each(
     check_new_folder(output)
     with Progress('importing') as progress:
         search = find_films(paths)
-        try:
+        with interruption_says('run the same command again to import the remaining videos'):
             batch = import_each(
                 search.films, output, settings, lambda done, _: progress.part(done)
             )
-        except KeyboardInterrupt as interruption:
-            raise KeyboardInterrupt(
-                'run the same command again to import the remaining videos'
-            ) from interruption
     batch.failed = search.failed | batch.failed
     for imported in batch.imported:
         _print_notices(imported)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.cli.parsing.tray_options import add_trays_file
 from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def _run_tray(options: argparse.Namespace) -> int:
     workers = Workers(processes=options.workers)
     written: list[str] = []
     filmed: dict[str, Any] = {}
-    try:
+    with interruption_says(lambda: _remaining_files(files, written)):
         with Progress('simulating') as bar:
             runs = simulate(plan, workers, bar.part)
         for path in files.write(runs):
@@ -150,8 +151,6 @@ def _run_tray(options: argparse.Namespace) -> int:
             with Progress('filming the bag') as bar:
                 filmed.update(files.film_bag(plan, bar.count))
             written.append(str(files.bag))
-    except KeyboardInterrupt as interruption:
-        raise KeyboardInterrupt(_remaining_files(files, written)) from interruption
     _print(options, files, runs, filmed)
     return 0
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from nanorocks_ros.cli.flags import flag_of, settings_from
 from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.errors import ConfigurationError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.settings import SceneFilmSettings, SimulationSettings, rows
 
 if TYPE_CHECKING:
@@ -55,7 +56,11 @@ def film_scene(options: argparse.Namespace) -> int:
     files = _files(options)
     recorder, filmed, settings = _recorder(options)
     written: list[str] = []
-    try:
+
+    def complete() -> str:
+        return f'complete: {", ".join(written)}' if written else 'nothing is complete'
+
+    with interruption_says(complete):
         if 'picture' in files:
             recorder.into_picture(files['picture'])
             written.append(str(files['picture']))
@@ -67,9 +72,6 @@ def film_scene(options: argparse.Namespace) -> int:
             with Progress('filming the bag') as bar:
                 recorder.into_bag(files['bag'], filmed.compression, options.quality, bar.count)
             written.append(str(files['bag']))
-    except KeyboardInterrupt as interruption:
-        state = f'complete: {", ".join(written)}' if written else 'nothing is complete'
-        raise KeyboardInterrupt(state) from interruption
     _print(options, recorder, files, {**asdict(filmed), 'simulation': asdict(settings)})
     return 0
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.jobs.tasks import as_completed_isolated
 from nanorocks_ros.outputs.safe_text import printable
 from nanorocks_ros.pipeline.composition import Pipeline
@@ -193,9 +194,8 @@ def run_batch(plan: BatchPlan, workers: Workers, watcher: Watcher) -> Batch:
             watcher.notice(text)
         store.write()
         try:
-            _run(store, tasks, workers, watcher)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(store)) from None
+            with interruption_says(lambda: _kept(store)):
+                _run(store, tasks, workers, watcher)
         finally:
             # On a full disk the earlier error is the better message.
             with suppress(RecordingError):

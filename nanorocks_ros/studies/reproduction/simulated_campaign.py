@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from nanorocks_ros.errors import RecordingError
 from nanorocks_ros.jobs.folder_lock import lock_folder
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.outputs.atomic_files import write_bytes
 from nanorocks_ros.outputs.json_values import read_object
@@ -113,19 +114,21 @@ def run_campaign(
     missing = {name: task for name, task in tasks.items() if not is_finished(task.folder)}
     done = len(tasks) - len(missing)
     progress(done / len(tasks))
-    try:
+
+    def kept() -> str:
+        finished = sum(is_finished(task.folder) for task in tasks.values())
+        return (
+            f'{finished} of {len(tasks)} cycles are kept in {folder}; the same command goes on '
+            'from there'
+        )
+
+    with interruption_says(kept):
         run_tasks(
             film_and_analyse,
             missing,
             workers,
             lambda count, _: progress((done + count) / len(tasks)),
         )
-    except KeyboardInterrupt:
-        kept = sum(is_finished(task.folder) for task in tasks.values())
-        raise KeyboardInterrupt(
-            f'{kept} of {len(tasks)} cycles are kept in {folder}; the same command goes on from '
-            'there'
-        ) from None
     return [read_cycle(task) for task in tasks.values()]
 
 

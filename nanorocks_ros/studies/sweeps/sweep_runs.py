@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.jobs.interruption import interruption_says
 from nanorocks_ros.jobs.journal import Journal, difference
 from nanorocks_ros.jobs.resumed_tasks import parts_folder
 from nanorocks_ros.jobs.tasks import Workers, as_completed
@@ -89,18 +90,11 @@ def sweep(
         folder = parts_folder(output) if output else Path(str(scratch))
         with Journal(folder, plan.specification()) as journal:
             work = _MissingRuns(plan, journal, progress or (lambda done, total: None))
-            try:
+            with interruption_says(work.kept) if output else nullcontext():
                 work.run(workers, notice or (lambda text: None))
                 result = assemble(plan, journal)
                 if output is not None:
                     result.save(output)
-            except KeyboardInterrupt:
-                if output is None:
-                    raise
-                raise KeyboardInterrupt(
-                    f'{work.done} of {plan.total_runs} runs are kept in {folder}; the same '
-                    'command goes on from there'
-                ) from None
             if output is not None:
                 journal.delete()
     return result
@@ -159,6 +153,12 @@ class _MissingRuns:
         with closing(as_completed(cool, tasks, workers)) as results:
             for key, part in results:
                 self._keep(tasks[key].first, part)
+
+    def kept(self) -> str:
+        return (
+            f'{self.done} of {self._plan.total_runs} runs are kept in {self._journal.folder}; the '
+            'same command goes on from there'
+        )
 
     def _keep(self, first: int, part: Arrays) -> None:
         size = len(part[COUNTS[0]])
