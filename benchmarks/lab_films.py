@@ -14,6 +14,7 @@ import json
 import math
 import sys
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -29,8 +30,9 @@ from benchmarks.shaded_film import (
     floor_px,
     write_shaded_film,
 )
-from benchmarks.soft_spheres import SoftBox, soft_run
+from benchmarks.soft_spheres import SoftBox, SoftRun, shaken, soft_run
 from benchmarks.source_key import source_key
+from benchmarks.turning_gas import Gas, states
 from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
@@ -38,8 +40,15 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 
 _FILMS = 4
 _SECONDS = 24.0
-# Rows of the table: friction and drag [1/s].
-_ROWS = ((0.0, 0.0), (0.05, 0.0), (0.0, 0.05))
+# Rows of the table: friction, drag [1/s] and sticking speed [m/s].
+_ROWS = (
+    (0.0, 0.0, 0.0),
+    (0.05, 0.0, 0.0),
+    (0.0, 0.05, 0.0),
+    (0.0, 0.0, 3e-3),
+    (0.0, 0.03, 3e-3),
+    (0.03, 0.03, 3e-3),
+)
 # Colours of floor and of beads of two species, bgr.
 _COLOURS = (
     ((70.0, 40.0, 30.0), ((225.0, 232.0, 235.0), (60.0, 190.0, 230.0))),
@@ -47,6 +56,8 @@ _COLOURS = (
     ((70.0, 110.0, 150.0), ((170.0, 60.0, 40.0), (50.0, 50.0, 60.0))),
     ((190.0, 185.0, 175.0), ((40.0, 50.0, 170.0), (70.0, 110.0, 40.0))),
 )
+# Mean of the projected speed over the standard deviation of a component.
+_PROJECTED = math.sqrt(0.5 * math.pi)
 # Margin around the floor, [px].
 _MARGIN = 64
 
@@ -61,16 +72,21 @@ class LabFilm:
         What is drawn depends on it alone.
     friction : float
     drag : float, [1/s]
+    sticking : float, [m/s]
+        Spheres stick below this normal speed, to bodies that turn; 0: never.
     """
 
     number: int
     friction: float
     drag: float
+    sticking: float
 
     @property
     def video(self) -> Path:
         """Where the film is, or will be."""
         physics = f'{round(1e3 * self.friction)}_{round(1e3 * self.drag)}'
+        if self.sticking:
+            physics += f'_{round(1e3 * self.sticking)}'
         return folder() / 'lab_films' / f'film_{self.number}_{physics}.mp4'
 
     @property
@@ -100,17 +116,17 @@ class LabTruth:
 def report() -> None:
     """Draw and measure the films, and print a row for each."""
     films = [
-        LabFilm(number=number, friction=friction, drag=drag)
-        for friction, drag in _ROWS
+        LabFilm(number=number, friction=friction, drag=drag, sticking=sticking)
+        for friction, drag, sticking in _ROWS
         for number in range(film_count(_FILMS))
     ]
     _run('drawing films', _draw, [film for film in films if not film.video.exists()])
     _run('measuring in films', _measure, [film for film in films if not film.results.exists()])
     print(
         '| film | beads | friction | drag [1/s] | found | beads: true | collisions | alone '
-        '| headline | walls: true | rebounds | alone | headline | flags |'
+        '| headline | walls: true | rebounds | alone | headline | sticking [mm/s] | flags |'
     )
-    print(f'{"| --- " * 14}|')
+    print(f'{"| --- " * 15}|')
     held: dict[str, list[bool]] = {}
     for film in films:
         print(_row(film, held))
@@ -181,9 +197,39 @@ def _run(label: str, task, films: list[LabFilm]) -> None:
 def _draw(film: LabFilm) -> None:
     truth = drawn_truth(film)
     rate = EXPOSURES * truth.camera.rate
-    run = soft_run(truth.box, _SECONDS, rate=rate, seed=film.number)
+    if film.sticking:
+        run = _sticking_run(film, truth.box, rate)
+    else:
+        run = soft_run(truth.box, _SECONDS, rate=rate, seed=film.number)
     film.video.parent.mkdir(parents=True, exist_ok=True)
     write_shaded_film(film.video, run, truth.box, truth.species, truth.camera)
+
+
+def _sticking_run(film: LabFilm, box: SoftBox, rate: float) -> SoftRun:
+    """At rest, shaken with the box, and then left alone: spheres fly and stick from the start."""
+    gas = Gas(
+        eps=box.restitution,
+        walls=box.wall_restitution,
+        sticking=film.sticking,
+        speed=_PROJECTED * box.speed,
+        drag=film.drag,
+        friction=film.friction,
+    )
+    rest, total = round(box.rest * rate), round(_SECONDS * rate)
+    random = np.random.default_rng(film.number)
+    masses, radii, sides = np.array(box.masses), np.array(box.radii), np.array(box.sides)
+    moving = list(islice(states(masses, radii, sides, gas, random, rate=rate), total - rest))
+    places = np.array([state.places for state in moving])
+    velocities = np.array([state.velocities for state in moving])
+    displacement, _ = shaken(box, total - rest, 1.0 / rate)
+    places[..., :2] += displacement[:, None]
+    still = np.repeat(places[:1], rest, axis=0)
+    return SoftRun(
+        positions=np.concatenate([still, places]),
+        velocities=np.concatenate([np.zeros_like(still), velocities]),
+        displacement=np.concatenate([np.zeros((rest, 2)), displacement]),
+        collisions=0,
+    )
 
 
 def _measure(film: LabFilm) -> None:
@@ -226,6 +272,11 @@ def _found(measured) -> dict[str, object]:
             for kind in ('restitution', 'wall_restitution')
             for name in (kind, f'{kind}_lower', f'{kind}_upper')
         } | {'drag': float(final['drag']), 'flags': str(final['quality'])}
+        clusters = measured.decay.clusters.iloc[-1]
+        found['clusters'] = {
+            name: float(clusters[name])
+            for name in ('sticking_speed', 'sticking_speed_lower', 'sticking_speed_upper', 'onset')
+        }
     return found
 
 
@@ -238,7 +289,7 @@ def _row(film: LabFilm, held: dict[str, list[bool]]) -> str:
     )
     cells = [f'{film.number}', sizes, f'{film.friction:g}', f'{film.drag:g}']
     if 'refusal' in found:
-        return f'| {" | ".join(cells)} | {found["refusal"]} |' + ' |' * 9
+        return f'| {" | ".join(cells)} | {found["refusal"]} |' + ' |' * 10
     final = found.get('final', {})
     cells.append(f'{final["drag"]:.4f}' if math.isfinite(final.get('drag', math.nan)) else '')
     truths = truth.box.restitution, truth.box.wall_restitution
@@ -252,8 +303,19 @@ def _row(film: LabFilm, held: dict[str, list[bool]]) -> str:
             lower, upper = told.get(f'{key}_lower', math.nan), told.get(f'{key}_upper', math.nan)
             if math.isfinite(told.get(key, math.nan)):
                 held.setdefault(f'{kind}, {source}', []).append(lower <= value <= upper)
-    cells.append(final.get('flags', ''))
+    cells += [_sticking(film, found.get('clusters', {}), held), final.get('flags', '')]
     return f'| {" | ".join(cells)} |'
+
+
+def _sticking(film: LabFilm, found: dict[str, float], held: dict[str, list[bool]]) -> str:
+    lower, upper = (found.get(f'sticking_speed_{end}', math.nan) for end in ('lower', 'upper'))
+    if math.isfinite(upper):
+        low = lower if math.isfinite(lower) else 0.0
+        held.setdefault('sticking speed', []).append(low <= film.sticking <= upper)
+    shown = {name: 1e3 * value for name, value in found.items() if name.startswith('sticking')}
+    return (
+        f'{1e3 * film.sticking:g}: {_interval(shown, "sticking_speed") or f"< {1e3 * upper:.2f}"}'
+    )
 
 
 def _interval(told: dict[str, float], name: str) -> str:

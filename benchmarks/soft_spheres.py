@@ -103,7 +103,7 @@ def soft_run(box: SoftBox, seconds: float, *, rate: float, seed: int) -> SoftRun
     step = 1.0 / (rate * every)
     at_rest = round(box.rest * rate)
     pictures = round(seconds * rate) - at_rest
-    displacement, box_velocity = _shaken(box, pictures * every, step)
+    displacement, box_velocity = shaken(box, pictures * every, step)
     masses = np.array(box.masses)
     stiffness = 0.5 * masses.min() * (math.pi / CONTACT_TIME) ** 2
     shape = pictures, *places.shape
@@ -154,7 +154,7 @@ def places_apart(box: SoftBox, random: np.random.Generator) -> np.ndarray:
     return np.array(places)
 
 
-def _shaken(box: SoftBox, steps: int, step: float) -> tuple[np.ndarray, np.ndarray]:
+def shaken(box: SoftBox, steps: int, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and velocity of the box at each step, (steps, 2)."""
     times = step * np.arange(steps)
     displacement = np.zeros((steps, 2))

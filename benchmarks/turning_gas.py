@@ -6,6 +6,7 @@ rigid bodies with momentum and angular momentum in three dimensions, smooth cont
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numba
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 RATE = 30.0
 """Frames per second."""
 
-# Largest way of the fastest bead in a time step, [m], and the fewest steps per frame.
-_MAX_WAY, _MIN_STEPS = 2e-5, 5
+# Largest way of the fastest bead in a time step, [m], and the fewest steps a second.
+_MAX_WAY, _MIN_RATE = 2e-5, 150.0
 
 # Most contacts between two frames.
 _MAX_CONTACTS = 1000
@@ -42,12 +43,18 @@ class Gas(NamedTuple):
         Beads stick below this normal speed.
     speed : float, [m/s]
         Mean projected speed at the start.
+    drag : float, [1/s]
+        Momentum and spin of every body, whatever its size, fall as exp(-drag t).
+    friction : float
+        Of Coulomb, at all contacts; what slides is stopped at most.
     """
 
     eps: float
     walls: float = 0.97
     sticking: float = 0.0
     speed: float = 0.01
+    drag: float = 0.0
+    friction: float = 0.0
 
 
 class Picture(NamedTuple):
@@ -76,22 +83,58 @@ def pictures(tray: Tray, gas: Gas, seed: int, frames: int) -> Iterator[Picture]:
     )
     densities = np.array([kind.density for kind in tray.species])[species]
     masses = densities * 4.0 / 3.0 * np.pi * radii**3
-    places = _scattered(rng, radii, np.array(tray.dimensions))
+    box = np.array(tray.dimensions)
+    for frame, state in enumerate(states(masses, radii, box, gas, rng, rate=RATE)):
+        if frame == frames:
+            return
+        seen = species, radii, state.places, state.velocities
+        yield Picture(_tracks(tray, rng, frame, seen), state.bodies, state.contacts)
+
+
+class State(NamedTuple):
+    """Places and velocities of the beads, (n, 3), and the rest as in `Picture`."""
+
+    places: np.ndarray
+    velocities: np.ndarray
+    bodies: np.ndarray
+    contacts: np.ndarray
+
+
+def states(
+    masses: np.ndarray,
+    radii: np.ndarray,
+    box: np.ndarray,
+    gas: Gas,
+    rng: np.random.Generator,
+    *,
+    rate: float,
+) -> Iterator[State]:
+    """States of a gas, so many a second, without end."""
+    places = _scattered(rng, radii, box)
     velocities = rng.normal(size=places.shape) / np.sqrt(masses)[:, None]
     velocities *= gas.speed / np.hypot(*velocities[:, :2].T).mean()
     labels = np.arange(radii.size)
     momenta, spins = masses[:, None] * velocities, np.zeros_like(places)
-    truth = np.array([gas.eps, gas.walls, gas.sticking])
-    box = np.array(tray.dimensions)
+    truth = np.array([gas.eps, gas.walls, gas.sticking, gas.drag, gas.friction])
     contacts = np.empty((0, 2))
-    for frame in range(frames):
-        tracks = _tracks(tray, rng, frame, (species, radii, places, velocities))
-        yield Picture(tracks, labels.copy(), contacts)
-        way = np.linalg.norm(velocities, axis=1).max() / RATE
-        steps = max(int(np.ceil(way / _MAX_WAY)), _MIN_STEPS)
+    while True:
+        yield State(places.copy(), velocities.copy(), labels.copy(), contacts)
+        way = np.linalg.norm(velocities, axis=1).max() / rate
+        steps = max(int(np.ceil(way / _MAX_WAY)), math.ceil(_MIN_RATE / rate))
         log = np.empty((_MAX_CONTACTS, 2))
         count = _advance(
-            places, velocities, labels, momenta, spins, masses, radii, box, truth, steps, log
+            places,
+            velocities,
+            labels,
+            momenta,
+            spins,
+            masses,
+            radii,
+            box,
+            truth,
+            1.0 / (rate * steps),
+            steps,
+            log,
         )
         contacts = log[:count]
 
@@ -188,7 +231,17 @@ def _velocity(b, point, momenta, spins, total, centre, inverse):
 
 
 @numba.njit(cache=True)
-def _meet_walls(places, labels, momenta, spins, radii, box, restitution, bodies):
+def _slide(size, velocity, normal, friction):
+    """Impulse against the sliding of a contact, and the speed of the sliding."""
+    along = velocity - (velocity * normal).sum() * normal
+    sliding = np.sqrt((along * along).sum())
+    if sliding == 0.0:
+        return np.zeros(3), 0.0
+    return -friction * size / sliding * along, sliding
+
+
+@numba.njit(cache=True)
+def _meet_walls(places, labels, momenta, spins, radii, box, truth, bodies):
     total, centre, inverse = bodies
     for k in range(radii.size):
         for axis in range(3):
@@ -203,9 +256,15 @@ def _meet_walls(places, labels, momenta, spins, radii, box, restitution, bodies)
                 velocity = _velocity(b, point, momenta, spins, total, centre, inverse)
                 approach = -(velocity * normal).sum()
                 if approach > 0.0:
-                    size = (1.0 + restitution) * approach
+                    size = (1.0 + truth[1]) * approach
                     size /= _mobility(b, point, normal, total, centre, inverse)
-                    _push(b, size * normal, point, momenta, spins, centre)
+                    hold, sliding = _slide(size, velocity, normal, truth[4])
+                    strength = np.sqrt((hold * hold).sum())
+                    if strength > 0.0:
+                        along = hold / strength
+                        most = sliding / _mobility(b, point, along, total, centre, inverse)
+                        hold = min(strength, most) * along
+                    _push(b, size * normal + hold, point, momenta, spins, centre)
 
 
 @numba.njit(cache=True)
@@ -238,8 +297,16 @@ def _meet(places, labels, momenta, spins, radii, truth, bodies, log, count):
             size /= _mobility(a, point, normal, total, centre, inverse) + _mobility(
                 b, point, normal, total, centre, inverse
             )
-            _push(b, size * normal, point, momenta, spins, centre)
-            _push(a, -size * normal, point, momenta, spins, centre)
+            hold, sliding = _slide(size, velocity, normal, truth[4])
+            strength = np.sqrt((hold * hold).sum())
+            if strength > 0.0:
+                along = hold / strength
+                yields = _mobility(a, point, along, total, centre, inverse) + _mobility(
+                    b, point, along, total, centre, inverse
+                )
+                hold = min(strength, sliding / yields) * along
+            _push(b, size * normal + hold, point, momenta, spins, centre)
+            _push(a, -size * normal - hold, point, momenta, spins, centre)
     return -1, -1, count
 
 
@@ -259,9 +326,12 @@ def _merge(a, b, labels, momenta, spins, total, centre):
 
 
 @numba.njit(cache=True)
-def _advance(places, velocities, labels, momenta, spins, masses, radii, box, truth, steps, log):
-    """Advance by one frame; the number of contacts in the log."""
-    step, count = 1.0 / (RATE * steps), 0
+def _advance(
+    places, velocities, labels, momenta, spins, masses, radii, box, truth, step, steps, log
+):
+    """Advance by so many steps; the number of contacts in the log."""
+    count = 0
+    kept = np.exp(-truth[3] * step)
     for _ in range(steps):
         bodies = _centres(places, labels, masses, radii)
         for k in range(masses.size):
@@ -279,7 +349,9 @@ def _advance(places, velocities, labels, momenta, spins, masses, radii, box, tru
             places[k] += drift
             velocities[k] = drift / step
         bodies = _centres(places, labels, masses, radii)
-        _meet_walls(places, labels, momenta, spins, radii, box, truth[1], bodies)
+        momenta *= kept
+        spins *= kept
+        _meet_walls(places, labels, momenta, spins, radii, box, truth, bodies)
         while True:
             i, j, count = _meet(places, labels, momenta, spins, radii, truth, bodies, log, count)
             if i < 0:
