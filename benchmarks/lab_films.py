@@ -79,7 +79,7 @@ class LabFilm:
     number: int
     friction: float
     drag: float
-    sticking: float
+    sticking: float = 0.0
 
     @property
     def video(self) -> Path:
@@ -312,10 +312,9 @@ def _sticking(film: LabFilm, found: dict[str, float], held: dict[str, list[bool]
     if math.isfinite(upper):
         low = lower if math.isfinite(lower) else 0.0
         held.setdefault('sticking speed', []).append(low <= film.sticking <= upper)
-    shown = {name: 1e3 * value for name, value in found.items() if name.startswith('sticking')}
-    return (
-        f'{1e3 * film.sticking:g}: {_interval(shown, "sticking_speed") or f"< {1e3 * upper:.2f}"}'
-    )
+    shown = {name: 1e3 * value for name, value in found.items()}
+    told = _interval(shown, 'sticking_speed') or f'< {1e3 * upper:.2f}'
+    return f'{1e3 * film.sticking:g}: {told}'
 
 
 def _interval(told: dict[str, float], name: str) -> str:
