@@ -85,6 +85,7 @@ class TrayStages:
 
     def __init__(self, settings: PipelineSettings, tray: Tray) -> None:
         self._tray = tray
+        self._last_ns: int | None = None
         self.measurement = TrayMeasurement(settings, tray)
         self.restitution = RestitutionEstimator(settings, tray)
         self.clusters = ClusterEstimator(settings, tray)
@@ -117,8 +118,18 @@ class TrayStages:
         self.clusters.emit_image = wanted.autocorrelation
 
     def push(self, image: TrayImage) -> tuple[Result, ...]:
-        """Everything that follows from the next image of the tray."""
-        return (*self._estimates(self.measurement.push(image)), *self.clusters.push(image))
+        """Everything that follows from the next image of the tray.
+
+        Where its stamp goes back, what is held back of the images before comes first.
+        """
+        before: tuple[Result, ...] = ()
+        if self._last_ns is not None and image.stamp_ns <= self._last_ns:
+            before = self.flush()
+            for stage in (self.measurement, self.restitution, self.clusters):
+                stage.reset()
+        self._last_ns = image.stamp_ns
+        estimates = self._estimates(self.measurement.push(image))
+        return (*before, *estimates, *self.clusters.push(image))
 
     def flush(self) -> tuple[Result, ...]:
         """Everything that is held back when the images end.

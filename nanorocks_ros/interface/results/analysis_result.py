@@ -260,8 +260,8 @@ def _cycle_rows(
     used = used_speeds(results.speeds, cycles, wall_prior(recording.analysis.prior))
     ends = ends_of_cycles(results.clusters)
     rows: list[tuple[str, ...]] = []
-    for cor in cycles:
-        words = cycle_as_json(cor, end_of_cycle(ends, cor), used[cor.cycle])
+    for cor, speeds in zip(cycles, used, strict=True):
+        words = cycle_as_json(cor, end_of_cycle(ends, cor), speeds)
         reason = words['reason']
         if reason is not None:
             flags[f'no COR: {reason["text"]}; {reason["remedy"]}'].append(recording.path)

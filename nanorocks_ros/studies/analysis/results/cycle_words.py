@@ -28,7 +28,7 @@ from nanorocks_ros.records.result_words import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from nanorocks_ros.records import (
         ClusterEstimate,
@@ -61,21 +61,33 @@ class UsedSpeeds:
 
 def used_speeds(
     speeds: Iterable[SpeedEstimate],
-    cycles: Iterable[CorEstimate],
+    cycles: Sequence[CorEstimate],
     walls: WallPrior | None = None,
-) -> dict[int, UsedSpeeds]:
-    """The speeds in the window of each cycle, by its number; the speeds are read once."""
-    windows = {cor.cycle: (cor.window_start, cor.window_end) for cor in cycles}
-    used = {cycle: UsedSpeeds(walls=walls or WallPrior()) for cycle in windows}
+) -> list[UsedSpeeds]:
+    """The speeds in the window of each cycle; the speeds are read once.
+
+    Where time goes back, as in a recording that loops, cycles are counted from 1 again.
+    """
+    used = [UsedSpeeds(walls=walls or WallPrior()) for _ in cycles]
+    places: dict[tuple[int, int], int] = {}
+    passes, last_cycle = 0, 0
+    for place, cor in enumerate(cycles):
+        passes += cor.cycle <= last_cycle
+        last_cycle = cor.cycle
+        places[passes, cor.cycle] = place
+    passes, last_ns = 0, 0
     for speed in speeds:
-        if speed.cycle not in windows or speed.cycle_start_ns is None:
+        passes += speed.stamp_ns < last_ns
+        last_ns = speed.stamp_ns
+        key = passes, speed.cycle
+        if key not in places or speed.cycle_start_ns is None:
             continue
-        first, last = windows[speed.cycle]
+        place = places[key]
         # Half a millisecond is the rounding of window times on the wire.
         age = (speed.stamp_ns - speed.cycle_start_ns) / NS
-        if first - 5e-4 <= age <= last + 5e-4:
-            used[speed.cycle].methods[speed.method] += 1
-            used[speed.cycle].flags.update(speed.quality.names())
+        if cycles[place].window_start - 5e-4 <= age <= cycles[place].window_end + 5e-4:
+            used[place].methods[speed.method] += 1
+            used[place].flags.update(speed.quality.names())
     return used
 
 

@@ -140,9 +140,9 @@ def _tray_as_json(analysis: Analysis, results: TrayResults, *, series: bool) -> 
                     ((starts[estimate.stamp_ns] or 0) - epoch_ns) / NS,
                     clusters := end_of_cycle(ends, estimate),
                 ),
-                **cycle_as_json(estimate, clusters, used[estimate.cycle]),
+                **cycle_as_json(estimate, clusters, speeds),
             }
-            for estimate in cycles
+            for estimate, speeds in zip(cycles, used, strict=True)
         ],
         'decays_left_out': sum(
             is_decay_left_out(estimate, include_inconsistent=analysis.include_inconsistent)

@@ -38,10 +38,10 @@ def tray_lines(analysis: Analysis, results: TrayResults) -> list[str]:
     ends = ends_of_cycles(results.clusters)
     lines = [*recognised, f'priors: {priors_in_words(analysis.prior)}']
     left_out = 0
-    for cor in cycles:
+    for cor, speeds in zip(cycles, used, strict=True):
         is_out = is_decay_left_out(cor, include_inconsistent=analysis.include_inconsistent)
         left_out += is_out
-        lines += cycle_lines(cor, end_of_cycle(ends, cor), used[cor.cycle], left_out=is_out)
+        lines += cycle_lines(cor, end_of_cycle(ends, cor), speeds, left_out=is_out)
     mean = cycles[-1].mean_restitution
     if len(cycles) > 1 and math.isfinite(mean.value):
         without = f', without the decays of {left_out}' if left_out else ''

@@ -227,7 +227,7 @@ def test_sticking_is_said_in_every_state(status, limits, words):
 def test_flags_are_counted_in_the_speeds_of_the_window():
     speeds = [speed(1.0 + 0.1 * k, quality=Quality(512 if k % 2 else 0)) for k in range(250)]
     cor = replace(FINAL, quality=Quality.UNCERTAIN)
-    used = used_speeds(speeds, [cor])[1]
+    used = used_speeds(speeds, [cor])[0]
     assert used.methods[SpeedMethod.TRACKING] == 183
     assert used.flags['uncertain'] == 91
     text = '\n'.join(cycle_lines(cor, None, used, left_out=False))
