@@ -34,6 +34,11 @@ _TRAY = (
     '--corners 3 3 205 205 --sides-mm 15 15 --height-mm 3 --diameter-px 27 --diameter-mm 2 '
     '--count 15 --density-g-cm3 1.18'
 )
+STUCK = (
+    'simulate --tray 1 --seed 3 --sticking-speed 0.005 --duration 12 --width-px 208 '
+    '--height-px 208 --video stuck.avi'
+)
+"""Beads soon stick, and their bodies turn and rebound."""
 COMMANDS = (
     f'analyse {_BAG} -o sample',
     f'statistics {_BAG}',
@@ -49,6 +54,8 @@ COMMANDS = (
     'measure film.avi --trays-file turned.yaml -o turned',
     'import ball --rate 60 -o fall',
     'measure fall --diameter-px 24 -o accelerated',
+    STUCK,
+    'measure stuck.avi --trays 1 -o stuck',
     'library --tray 1 --nodes 254 --rough-nodes 188 --runs 2 -o library.npz',
     'simulate --scene --duration 2 --first-shake 0.5 --effects all --bag plate',
     'analyse plate --preprocess-layout plate -o plate_results',

@@ -55,13 +55,13 @@ print(*sorted(used - set(listed_versions())), sep='\\n', file=sys.stderr)
 
 
 @pytest.fixture(scope='module')
-def ball(tmp_path_factory):
-    """A film of a ball, imported."""
-    folder = tmp_path_factory.mktemp('ball')
+def films(tmp_path_factory):
+    """A folder with a film of a ball, imported, and one of beads that stick."""
+    folder = tmp_path_factory.mktemp('films')
     function_list.draw_ball(folder / 'ball')
-    words = ['import', 'ball', '--rate', '60', '-o', 'fall']
-    command = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
-    subprocess.run([sys.executable, '-c', command, *words], cwd=folder, check=True)
+    main = 'import sys; from nanorocks_ros.cli.main import main; sys.exit(main())'
+    for command in ('import ball --rate 60 -o fall', function_list.STUCK):
+        subprocess.run([sys.executable, '-c', main, *command.split()], cwd=folder, check=True)
     return folder
 
 
@@ -71,12 +71,14 @@ def ball(tmp_path_factory):
         ((), 70),
         (('analyse', str(SAMPLE), '--no-output'), 55),
         (('measure', 'fall', '--diameter-px', '24', '-o', 'out'), 25),
+        (('simulate', '--sticking-speed', '0.005', '--duration', '2'), 10),
+        (('measure', 'stuck.avi', '--trays', '1', '-o', 'stuck'), 55),
     ],
-    ids=['nodes', 'analyse', 'measure'],
+    ids=['nodes', 'analyse', 'measure', 'simulate', 'measure_stuck'],
 )
-def test_commands_and_nodes_call_only_what_is_listed(ball, words, fewest):
+def test_commands_and_nodes_call_only_what_is_listed(films, words, fewest):
     done = subprocess.run(
-        [sys.executable, '-c', CALLED, *words], cwd=ball, capture_output=True, text=True
+        [sys.executable, '-c', CALLED, *words], cwd=films, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     said = done.stderr.splitlines()
