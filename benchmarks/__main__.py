@@ -75,6 +75,7 @@ ALL = (
     'speed_dependence',
     'speed_headlines',
     'drawn_exponents',
+    'combined_physics',
     'sensitivity',
     'gas_statistics',
     'engine',

@@ -59,14 +59,15 @@ def _film(tray: int, exponent: float, number: int) -> DrawnFilm:
 
 def _cells(read: Sequence[ReadFilm], exponent: float) -> str:
     """All cells but those of the case."""
-    used = [film for film in read if _is_unflagged(film)]
+    used = [film for film in read if is_unflagged(film)]
     depends = sum(bool(film.result.cycles[0].quality & Quality.SPEED_DEPENDENT) for film in used)
     return f'{len(read)} | {len(used)} | {depends} | {_exponents(used, exponent)} | ' + (
         _headlines(used)
     )
 
 
-def _is_unflagged(film: ReadFilm) -> bool:
+def is_unflagged(film: ReadFilm) -> bool:
+    """Whether a film has a final estimate, and no flag but that beads lose more when faster."""
     final = film.result.final
     return final is not None and not final.quality & ~(HARMLESS | Quality.SPEED_DEPENDENT)
 
@@ -104,7 +105,7 @@ def _headlines(films: Sequence[ReadFilm]) -> str:
     """How often headline and constant restitution hold the truth; error, and half-width."""
     rows = []
     for film in films:
-        truth = _truth(film)
+        truth = energy_truth(film)
         published, constant = (
             getattr(film.result.cycles[0], name) for name in ('restitution', 'contact_restitution')
         )
@@ -126,7 +127,7 @@ def _headlines(films: Sequence[ReadFilm]) -> str:
     )
 
 
-def _truth(read_film: ReadFilm) -> float:
+def energy_truth(read_film: ReadFilm) -> float:
     """Restitution that loses as much energy as the true collisions among those found."""
     film = read_film.film
     found = (
