@@ -39,6 +39,12 @@ _PARTING = 0.75, 0.4
 _HEIGHTS = (np.arange(32) + 0.5) / 32
 # Radii at which collision rates are worked out.
 _RADII = 16
+# Nearest over farthest distance in the image of two beads that turn together, as a rule.
+_TURNING = 0.7
+# Part of the pairs of beads that are known as bodies within the path of a first merge.
+_MOST = 0.9
+# Longest path that is searched for it, [m].
+_LONGEST = 1.0
 # Way of a bead between two shaking events, [m]: 58 s after a shake at 10 mm/s it was 0.03 to 0.12.
 _CYCLE = 0.1
 
@@ -214,3 +220,44 @@ def max_chance_probability(tray: Tray, false_alarm_rate: float) -> float:
             'bodies.false_alarm_rate', f'{false_alarm_rate!r}', 'give a rate between 0 and 1'
         )
     return false_alarm_rate / max(expected_encounters(tray), 1.0)
+
+
+def first_merge_path(tray: Tray, false_alarm_rate: float) -> float:
+    """Path of the beads, at their mean projected speed, in which a first merge becomes known.
+
+    That of two beads that turn together, at energies that are the same for all: a merge that comes
+    later is not seen by the end. Later merges of a cycle need less.
+
+    Parameters
+    ----------
+    tray : Tray
+    false_alarm_rate : float, 0 to 1
+        As of `max_chance_probability`.
+
+    Returns
+    -------
+    float, [m]
+    """
+    kinds = [kind for kind in tray.species if kind.count]
+    radii = 0.5 * np.array([kind.diameter for kind in kinds])
+    counts = np.array([kind.count for kind in kinds], dtype=np.float64)
+    variances = 1.0 / np.array([kind.bead_mass for kind in kinds])
+    mean_speed = math.sqrt(0.5 * math.pi) * float(counts @ np.sqrt(variances)) / counts.sum()
+    i, j = np.triu_indices(len(kinds))
+    pairs = np.where(i == j, 0.5 * counts[i] * (counts[i] - 1.0), counts[i] * counts[j])
+    low, high = (pick(variances[i], variances[j]) for pick in (np.minimum, np.maximum))
+    collisions = CollisionRate(tray)(np.minimum(radii[i], radii[j]), 1.0 + low / high)
+    # Relative paths, on a grid that is fine enough.
+    paths = np.geomspace(1e-4, _LONGEST, 2000)
+    chances = turning_chance_probability(
+        paths,
+        _TURNING * (radii[i] + radii[j])[:, np.newaxis],
+        (radii[i] + radii[j])[:, np.newaxis],
+        (parting_share(tray) * collisions)[:, np.newaxis],
+    )
+    is_known = chances < max_chance_probability(tray, false_alarm_rate)
+    known = np.where(is_known.any(axis=1), paths[is_known.argmax(axis=1)], _LONGEST)
+    needed = known * mean_speed / np.sqrt(variances[i] + variances[j])
+    order = np.argsort(needed)
+    shares = np.cumsum(pairs[order]) / max(pairs.sum(), 1.0)
+    return float(needed[order][min(np.searchsorted(shares, _MOST), needed.size - 1)])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import gammaincc
 
 from nanorocks_ros.errors import FitError
 from nanorocks_ros.inference.sticking.bounce_tables import SPEEDS
@@ -26,6 +27,8 @@ _LEAST_SHARE = 0.3
 _REACH_POWER = 0.5
 # Merges are reported late; those further back than this rarely change, [s].
 _SETTLED = 4.0
+# Probabilities below it are taken for it.
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +47,7 @@ class MergeLikelihood:
         did not stick.
     expected : ndarray (n,)
         Expected number of merges.
+    cycles : int
     """
 
     speeds: NDArray[np.float64]
@@ -51,6 +55,7 @@ class MergeLikelihood:
     exposed: bool
     logs: NDArray[np.float64]
     expected: NDArray[np.float64]
+    cycles: int = 1
 
     def __add__(self, other: MergeLikelihood) -> MergeLikelihood:
         return MergeLikelihood(
@@ -59,6 +64,7 @@ class MergeLikelihood:
             exposed=self.exposed or other.exposed,
             logs=self.logs + other.logs,
             expected=self.expected + other.expected,
+            cycles=self.cycles + other.cycles,
         )
 
 
@@ -103,7 +109,7 @@ class MergeRates:
         self.speeds = highest * (np.arange(1, _NODES + 1) / _NODES) ** 2
         nothing = np.zeros(_NODES)
         self.nothing = MergeLikelihood(
-            speeds=self.speeds, merges=0, exposed=False, logs=nothing, expected=nothing
+            speeds=self.speeds, merges=0, exposed=False, logs=nothing, expected=nothing, cycles=0
         )
         self._known: StickingCycle | None = None
         self._expected = np.zeros(_NODES)
@@ -119,10 +125,16 @@ class MergeRates:
             For speeds or times that cannot be used.
         """
         usable = _first_part(_checked(cycle), self._fewest)
-        if usable.times.size < 2 or usable.bodies[0] <= 1.0:
-            return replace(self.nothing, merges=usable.merges.size)
+        # A cycle of one time tells nothing, unless that is all in which a merge could be known.
+        fewest = 2 if usable.merges.size else 1
+        if usable.times.size < fewest or usable.bodies[0] <= 1.0:
+            return replace(self.nothing, merges=usable.merges.size, cycles=1)
         speeds = np.interp(usable.merges, usable.times, usable.speeds)
         logs = self._contacts.summed_log_rate_below(self.speeds, speeds, self._measure)
+        expected = self._expected_in(usable)
+        if not usable.merges.size and usable.undecided > 0.0:
+            # As many or fewer may have merged: the probability of that, not of none.
+            logs = logs + expected + _log_at_most(usable.undecided, expected)
         if usable.merges.size and usable.bounces.size:
             logs = logs + np.interp(self.speeds, SPEEDS, usable.bounces)
         return MergeLikelihood(
@@ -130,7 +142,7 @@ class MergeRates:
             merges=usable.merges.size,
             exposed=True,
             logs=logs + np.log(speeds).sum(),
-            expected=self._expected_in(usable),
+            expected=expected,
         )
 
     def _expected_in(self, cycle: StickingCycle) -> NDArray[np.float64]:
@@ -160,6 +172,11 @@ class MergeRates:
         wider = (self._beads / bodies) ** _REACH_POWER
         weights = width * 0.5 * bodies**2 / self._beads * wider * speeds * (bodies > 1.0)
         return self._contacts.summed_rate_below(self.speeds, speeds, weights, self._measure)
+
+
+def _log_at_most(count: float, expected: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logarithm of the probability of so many events or fewer, if they are expected."""
+    return np.asarray(np.log(np.maximum(gammaincc(count + 1.0, expected), _TINY)))
 
 
 def _begins_with(cycle: StickingCycle, start: StickingCycle) -> bool:

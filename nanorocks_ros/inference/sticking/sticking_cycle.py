@@ -36,6 +36,8 @@ class StickingCycle:
         Free bodies.
     merges : ndarray (m,), [s]
         Times at which bodies merged.
+    undecided : float
+        Merges that may have gone unseen in a cycle without any.
     bounces : ndarray (k,)
         Log likelihood of each of `bounce_tables.SPEEDS` by the collisions of free beads that did
         not stick; empty where they are not known.
@@ -45,6 +47,7 @@ class StickingCycle:
     speeds: NDArray[np.float64]
     bodies: NDArray[np.float64]
     merges: NDArray[np.float64]
+    undecided: float = 0.0
     bounces: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
@@ -54,10 +57,15 @@ def sticking_cycle(
     stamps_ns: NDArray[np.int64],
     speeds: NDArray[np.float64],
     start_ns: int,
+    *,
+    first_merge_path: float = 0.0,
 ) -> StickingCycle:
     """Cycle from the merges of a `BodyCounter` and the speeds of the beads.
 
-    It ends where later merges are not known yet: see `_while_merges_show`.
+    It ends where later merges are not known yet: a merge is known once free beads would have
+    parted, which takes a path, not a time: the slower the gas, the longer. Of merges with a
+    shorter path to the end many are missing: as bodies that did not merge they would speak for too
+    low a sticking speed. The first merge always counts.
 
     Parameters
     ----------
@@ -69,6 +77,9 @@ def sticking_cycle(
     speeds : ndarray (n,), [m/s]
     start_ns : int, [ns]
         The shaking event; the speed is constant from there to the first stamp.
+    first_merge_path : float, [m]
+        From `chance_proximity.first_merge_path`, where there is no merge; else the path is that in
+        which the merges of the cycle became known.
     """
     end = (int(stamps_ns[-1]) - start_ns) / _NS
     merge_times = sorted((merge.stamp_ns - start_ns) / _NS for merge in merges if merge.joins)
@@ -89,30 +100,21 @@ def sticking_cycle(
         for merge in merges
         if merge.joins and (merge.stamp_ns - start_ns) / _NS <= end
     ]
-    return _while_merges_show(cycle, np.array(known).reshape(-1, 2))
-
-
-def _while_merges_show(cycle: StickingCycle, known: NDArray[np.float64]) -> StickingCycle:
-    """The part of a cycle whose merges are known by its end.
-
-    A merge is known once free beads would have parted, which takes a path, not a time: the slower
-    the gas, the longer. Of merges with a shorter path to the end many are missing: as bodies that
-    did not merge they would speak for too low a sticking speed. The first merge always counts.
-
-    Parameters
-    ----------
-    cycle : StickingCycle
-    known : ndarray (m, 2), [s]
-        For each merge since when the beads are beside each other, and when it was known.
-    """
-    if not known.size:
-        return cycle
     # Trapezoidal rule.
     steps = 0.5 * (cycle.speeds[1:] + cycle.speeds[:-1]) * np.diff(cycle.times)
     path = np.append(0.0, np.cumsum(steps))
-    began, ended = (np.interp(times, cycle.times, path) for times in known.T)
-    needed = float(np.quantile(ended - began, _MOST))
-    shows = (path <= path[-1] - needed) | (cycle.times <= cycle.merges[0])
+    needed, first = first_merge_path, cycle.times[0]
+    if known:
+        began, ended = (np.interp(times, cycle.times, path) for times in np.array(known).T)
+        needed, first = float(np.quantile(ended - began, _MOST)), cycle.merges[0]
+    return _up_to_path(cycle, path, path[-1] - needed, first)
+
+
+def _up_to_path(
+    cycle: StickingCycle, path: NDArray[np.float64], longest: float, first: float
+) -> StickingCycle:
+    """The part of a cycle up to a path of the beads, (n,), and at least up to a first time."""
+    shows = (path <= longest) | (cycle.times <= first)
     last = cycle.times[shows][-1]
     return replace(
         cycle,

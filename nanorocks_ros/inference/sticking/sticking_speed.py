@@ -13,6 +13,7 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import logsumexp
 
 from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.numerics.log_sums import log_sum
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 
 # Log of a factor of all rates, in standard deviations: nodes and weights of its normal law.
 _NORMAL_NODES, _NORMAL_WEIGHTS = np.polynomial.hermite_e.hermegauss(9)
+# The same where each leaves a narrow range of speeds.
+_CLOSE_NODES = np.linspace(-3.5, 3.5, 141)
+_CLOSE_WEIGHTS = np.exp(-0.5 * _CLOSE_NODES**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +121,10 @@ def sticking_estimate_of(
 def merge_log_likelihood(terms: MergeLikelihood, rate_error: float) -> NDArray[np.float64]:
     """Log likelihood of each sticking speed of the grid, (n,), by the merges.
 
+    Many cycles would tell the common error of the rates by how merges are spread over time, for
+    which the theory of the rates is not right enough. So of several cycles each error stays as
+    likely as before: up to a factor, it is their probability of each speed, averaged over them.
+
     Parameters
     ----------
     terms : MergeLikelihood
@@ -124,13 +132,15 @@ def merge_log_likelihood(terms: MergeLikelihood, rate_error: float) -> NDArray[n
     rate_error : float
         As of `sticking_estimate_of`.
     """
-    factors = rate_error * _NORMAL_NODES[:, np.newaxis]
-    return np.asarray(
-        log_sum(
-            terms.merges * factors + terms.logs - np.exp(factors) * terms.expected,
-            _NORMAL_WEIGHTS / _NORMAL_WEIGHTS.sum(),
-        )
-    )
+    several = terms.cycles > 1
+    nodes = _CLOSE_NODES if several else _NORMAL_NODES
+    weights = _CLOSE_WEIGHTS if several else _NORMAL_WEIGHTS
+    factors = rate_error * nodes[:, np.newaxis]
+    by_error = terms.merges * factors + terms.logs - np.exp(factors) * terms.expected
+    if several:
+        totals = logsumexp(by_error, axis=1, keepdims=True, b=np.gradient(terms.speeds))
+        by_error = by_error - totals
+    return np.asarray(log_sum(by_error, weights / weights.sum()))
 
 
 def _posterior(
@@ -141,7 +151,7 @@ def _posterior(
     posterior = _Posterior(grid=grid, likelihood=likelihood, total=total / total[-1])
     if merges == 0:
         status = StickingStatus.NO_MERGE
-    elif likelihood[-1] > likelihood.max() - _drop(probability):
+    elif posterior.is_open(probability):
         # All colliding bodies stuck: any higher speed fits as well.
         status = StickingStatus.NO_UPPER_LIMIT
     else:
@@ -172,11 +182,16 @@ class _Posterior(NamedTuple):
         """The speed below which the sticking speed is with a probability."""
         return float(np.interp(probability, self.total, self.grid))
 
+    def is_open(self, probability: float) -> bool:
+        """Whether the highest speed fits as well."""
+        return bool(self.likelihood[-1] > self.likelihood.max() - _drop(probability))
+
     def interval(self, status: StickingStatus, probability: float) -> tuple[float, float]:
         """From both sides where the speed is measured, else from one."""
         tail = 0.5 * (1.0 - probability)
         if status is StickingStatus.NO_MERGE:
-            return 0.0, self.quantile(probability)
+            # Where any speed fits, the prior alone would give the limit.
+            return 0.0, math.inf if self.is_open(probability) else self.quantile(probability)
         if status is StickingStatus.MEASURED:
             return self.quantile(tail), self.quantile(1.0 - tail)
         # The flat prior up to the highest speed would raise the quantile: the likelihood alone

@@ -13,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros.errors import NanorocksError
 from nanorocks_ros.inference.sticking.bounce_tables import RunningBounces
+from nanorocks_ros.inference.sticking.chance_proximity import first_merge_path
 from nanorocks_ros.inference.sticking.merge_likelihood import MergeLikelihood, MergeRates
 from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle, sticking_cycle
 from nanorocks_ros.inference.sticking.sticking_speed import StickingEstimate, sticking_estimate_of
@@ -88,6 +89,7 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
         self._delay_ns = round(settings.cooling.delay * NS)
         self._merges_after_ns = merges_after_ns(settings.bodies)
         self._kept_ns = clusters_after_ns(settings.bodies) + _KEPT_NS
+        self._first_merge_path = first_merge_path(tray, settings.bodies.false_alarm_rate)
         self._make_rates: Callable[[], MergeRates] | None = None
         with suppress(NanorocksError):
             # Without a theory of the tray merges are counted, but there is no sticking speed.
@@ -211,8 +213,12 @@ class StickingEstimator(RestartingStage[Input, NoReturn]):
             np.array(own.stamps_ns[:used], dtype=np.int64),
             np.array(own.speeds[:used]),
             own.start_ns,
+            first_merge_path=self._first_merge_path,
         )
-        return replace(so_far, bounces=self._bounces(own, merges, stamp_ns)) if merges else so_far
+        if merges:
+            return replace(so_far, bounces=self._bounces(own, merges, stamp_ns))
+        counted = self.bodies(cycle, stamp_ns)
+        return replace(so_far, undecided=counted.bodies.error if counted else 0.0)
 
     def _bounces(self, own: _Cycle, merges: list[Merge], stamp_ns: int) -> NDArray[np.float64]:
         """What collisions of free beads up to a second before an instant tell; empty without."""

@@ -5,12 +5,13 @@ Tested by ``test/studies/batch/test_batch_analysis.py``.
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, TypedDict, cast
 
 import numpy as np
 
 from nanorocks_ros.errors import RecordingError
+from nanorocks_ros.inference.sticking.sticking_cycle import StickingCycle
 from nanorocks_ros.outputs.json_values import json_values, read_object
 from nanorocks_ros.outputs.named_recordings import with_recording
 from nanorocks_ros.outputs.safe_text import printable
@@ -130,6 +131,6 @@ def evidence_arrays(analysis: Analysis) -> Arrays:
             for name, values in results.evidence.arrays().items():
                 arrays[f'{number}/cor/{name}'] = values
         for k, cycle in enumerate(results.sticking):
-            for name in ('times', 'speeds', 'bodies', 'merges'):
-                arrays[f'{number}/sticking/{k:05d}/{name}'] = getattr(cycle, name)
+            for name in (own.name for own in fields(StickingCycle)):
+                arrays[f'{number}/sticking/{k:05d}/{name}'] = np.asarray(getattr(cycle, name))
     return arrays

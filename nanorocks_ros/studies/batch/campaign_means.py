@@ -51,6 +51,8 @@ MEANS = {
 # Of these a decay that is too short tells nothing, and its fit anything: they are not part of a
 # mean unless they are known to a part of themselves.
 _FITTED = 'initial_speed', 'haff_time'
+# Of sticking cycles: results of earlier versions do not have these.
+_LATER = {'bounces', 'undecided'}
 (_WRONG_SCALE,) = Quality.WRONG_SCALE.names()
 
 
@@ -271,13 +273,14 @@ def _sticking(arrays: Mapping[str, NDArray[Any]], number: int) -> list[StickingC
     for name, values in _below(arrays, f'{number}/sticking/').items():
         cycle, _, field_name = name.partition('/')
         by_cycle.setdefault(cycle, {})[field_name] = values
-    # Results of earlier versions have no collisions.
-    names = {field.name for field in fields(StickingCycle) if field.name != 'bounces'}
-    return [
-        StickingCycle(**by_cycle[cycle])
-        for cycle in sorted(by_cycle)
-        if names == {*by_cycle[cycle]} - {'bounces'}
-    ]
+    names = {field.name for field in fields(StickingCycle)} - _LATER
+    cycles = []
+    for cycle in sorted(by_cycle):
+        own = by_cycle[cycle]
+        if names == {*own} - _LATER:
+            undecided = float(own.pop('undecided')) if 'undecided' in own else 0.0
+            cycles.append(StickingCycle(**own, undecided=undecided))
+    return cycles
 
 
 def _campaign(results: Sequence[BagResults], column: str) -> Campaign | None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from nanorocks_ros.inference.sticking.chance_proximity import (
     CollisionRate,
     chance_probability,
     expected_encounters,
+    first_merge_path,
     max_chance_probability,
     parting_rate,
     parting_share,
@@ -80,3 +82,22 @@ def test_the_false_alarm_rate_is_divided_among_all_encounters_of_a_cycle():
 def test_a_false_alarm_rate_outside_0_to_1_is_refused(rate):
     with pytest.raises(ConfigurationError, match='false_alarm_rate'):
         max_chance_probability(load_trays()[1], rate)
+
+
+def test_a_first_merge_needs_the_path_in_which_free_beads_would_have_parted():
+    needed = [first_merge_path(load_trays()[1], rate) for rate in (0.1, 0.01, 0.001)]
+    assert needed[0] < needed[1] < needed[2]
+    # Of equal beads the relative path is 2/pi^(1/2) times that at the mean projected speed.
+    tray = load_trays()[1]
+    paths = 2.0 / math.sqrt(math.pi) * needed[1] * np.array([0.99, 1.01])
+    parting = parting_share(tray) * CollisionRate(tray)(
+        np.array([0.5 * tray.species[0].diameter]), np.array([2.0])
+    )
+    diameter = tray.species[0].diameter
+    before, after = turning_chance_probability(paths, 0.7 * diameter, diameter, parting)
+    assert before > max_chance_probability(tray, 0.01) > after
+
+
+def test_a_first_merge_of_a_mixture_needs_the_path_of_its_slow_pairs():
+    equal, mixed = (first_merge_path(load_trays()[number], 0.01) for number in (1, 3))
+    assert mixed > equal

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,6 +125,22 @@ def test_a_lower_limit_alone_leaves_as_much_below_it_as_an_interval():
     assert drop == pytest.approx(0.5 * 1.96**2, abs=0.05)
 
 
+def test_many_cycles_do_not_tell_the_error_of_the_rates():
+    """Where merges are spread over time in another way than the theory says."""
+    rng = np.random.default_rng(8)
+    early = [
+        replace(cycle, speeds=cycle.speeds * (1.0 + np.exp(-0.5 * TIMES)))
+        for cycle in (_cycle(rng, 2e-3) for _ in range(60))
+    ]
+    singles = [sticking_estimate([cycle], CONTACTS, BEADS) for cycle in early]
+    together = sticking_estimate(early, CONTACTS, BEADS)
+    mean = np.mean([estimate.sticking_speed for estimate in singles])
+    assert together.sticking_speed == pytest.approx(mean, rel=0.12)
+    # Their error of 25 % stays, however many there are: rates go with the square of the speed.
+    half_width = 0.5 * math.log(together.upper / together.lower)
+    assert half_width == pytest.approx(1.96 * 0.25 / 2.0, rel=0.2)
+
+
 def _merge(seconds, joins=True, known=None):
     stamp_ns = START + round(seconds * 1e9)
     return Merge(
@@ -164,6 +181,37 @@ def test_the_first_merge_counts_though_others_may_be_missing():
     cycle = sticking_cycle(BEADS, [_merge(3.5, known=9.5)], stamps, np.full(10, 1e-2), START)
     assert cycle.merges.tolist() == [3.5]
     assert cycle.times[-1] < 4.0 + 1e-6
+
+
+def test_without_a_merge_a_cycle_ends_where_the_first_could_not_be_known_any_more():
+    stamps = START + np.arange(1, 11) * 1_000_000_000
+    cycle = sticking_cycle(
+        BEADS, [], stamps, np.full(10, 1e-2), START, first_merge_path=30e-3 - 1e-6
+    )
+    assert cycle.times[-1] == 7.0
+    nothing = sticking_cycle(BEADS, [], stamps, np.full(10, 1e-2), START, first_merge_path=0.2)
+    assert nothing.times.tolist() == [0.0]
+    estimate = sticking_estimate([nothing], CONTACTS, BEADS)
+    assert estimate.status is StickingStatus.NO_MERGE
+    assert estimate.upper == math.inf
+
+
+def test_merges_that_may_have_gone_unseen_raise_the_upper_limit():
+    none, two = (
+        sticking_estimate([replace(EMPTY, undecided=count)], CONTACTS, BEADS, rate_error=1e-6)
+        for count in (0.0, 2.0)
+    )
+    assert two.status is StickingStatus.NO_MERGE
+    # Up to two merges of a Poisson process, with a flat prior in the sticking speed.
+    speeds = np.linspace(1e-6, 0.03, 20_000)
+    expected = np.interp(
+        speeds,
+        *(getattr(MergeRates(CONTACTS, BEADS).terms(EMPTY), n) for n in ('speeds', 'expected')),
+    )
+    likelihood = np.exp(-expected) * (1.0 + expected + 0.5 * expected**2)
+    limit = np.interp(0.95, np.cumsum(likelihood) / likelihood.sum(), speeds)
+    assert two.upper == pytest.approx(limit, rel=0.03)
+    assert two.upper > 1.3 * none.upper
 
 
 def test_merges_that_a_slow_gas_hides_do_not_lower_the_sticking_speed():
