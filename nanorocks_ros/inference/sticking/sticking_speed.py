@@ -44,8 +44,9 @@ class StickingEstimate:
     sticking_speed : float, [m/s]
         Median of the posterior; NaN unless measured.
     lower, upper : float, [m/s]
-        Interval. Without a merge it runs from 0 to an upper limit; if all colliding bodies stuck,
-        from a lower limit to the highest speed of the grid.
+        Interval. Without a merge it runs from 0 to an upper limit, which is infinite where any
+        speed fits; if all colliding bodies stuck, from a lower limit to the highest speed of the
+        grid.
     lower_68, upper_68 : float, [m/s]
         The same with the probability `ONE_SIGMA`.
     merges : int
