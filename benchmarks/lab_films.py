@@ -313,7 +313,8 @@ def _sticking(film: LabFilm, found: dict[str, float], held: dict[str, list[bool]
         low = lower if math.isfinite(lower) else 0.0
         held.setdefault('sticking speed', []).append(low <= film.sticking <= upper)
     shown = {name: 1e3 * value for name, value in found.items()}
-    told = _interval(shown, 'sticking_speed') or f'< {1e3 * upper:.2f}'
+    limit = f'< {1e3 * upper:.2f}' if math.isfinite(upper) else 'unknown'
+    told = _interval(shown, 'sticking_speed') or limit
     return f'{1e3 * film.sticking:g}: {told}'
 
 
