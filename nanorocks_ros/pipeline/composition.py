@@ -128,8 +128,10 @@ class TrayStages:
             for stage in (self.measurement, self.restitution, self.clusters):
                 stage.reset()
         self._last_ns = image.stamp_ns
-        estimates = self._estimates(self.measurement.push(image))
-        return (*before, *estimates, *self.clusters.push(image))
+        return (*before, *self._follow(image))
+
+    def _follow(self, image: TrayImage) -> tuple[Result, ...]:
+        return (*self._estimates(self.measurement.push(image)), *self.clusters.push(image))
 
     def flush(self) -> tuple[Result, ...]:
         """Everything that is held back when the images end.

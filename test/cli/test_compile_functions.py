@@ -19,7 +19,7 @@ from nanorocks_ros.tools.compilation import parallel_compilation
 
 if __name__ == '__main__':
     versions = parallel_compilation.listed_versions()
-    (longest,) = [version for version in versions if version.function == 'run_until']
+    longest = next(version for version in versions if version.function == 'run_until')
     wrong = longest._replace(function='nothing')
     chosen = (*versions[-3:], wrong if '--wrong' in sys.argv else longest)[:int(sys.argv[1])]
     parallel_compilation.listed_versions = lambda: chosen
