@@ -184,4 +184,5 @@ def _by_true_merges(film: FilmTruth) -> StickingEstimate:
 
 
 def _holds(cluster: ClusterEstimate, true: float) -> bool:
-    return cluster.sticking_speed.lower <= true <= cluster.sticking_speed.upper
+    # No limit is NaN.
+    return not (true < cluster.sticking_speed.lower or true > cluster.sticking_speed.upper)

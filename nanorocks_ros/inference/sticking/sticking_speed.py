@@ -44,9 +44,8 @@ class StickingEstimate:
     sticking_speed : float, [m/s]
         Median of the posterior; NaN unless measured.
     lower, upper : float, [m/s]
-        Interval. Without a merge it runs from 0 to an upper limit, which is infinite where any
-        speed fits; if all colliding bodies stuck, from a lower limit to the highest speed of the
-        grid.
+        Interval. Without a merge it runs from 0 to an upper limit, which is NaN where any speed
+        fits; if all colliding bodies stuck, from a lower limit to the highest speed of the grid.
     lower_68, upper_68 : float, [m/s]
         The same with the probability `ONE_SIGMA`.
     merges : int
@@ -192,7 +191,7 @@ class _Posterior(NamedTuple):
         tail = 0.5 * (1.0 - probability)
         if status is StickingStatus.NO_MERGE:
             # Where any speed fits, the prior alone would give the limit.
-            return 0.0, math.inf if self.is_open(probability) else self.quantile(probability)
+            return 0.0, math.nan if self.is_open(probability) else self.quantile(probability)
         if status is StickingStatus.MEASURED:
             return self.quantile(tail), self.quantile(1.0 - tail)
         # The flat prior up to the highest speed would raise the quantile: the likelihood alone
