@@ -1,7 +1,7 @@
 """Hard spheres in a box that stick when slow and then turn as rigid bodies: truth for recognition.
 
 It shares nothing with `nanorocks_ros.simulation`, whose bodies turn as well: time stepping, free
-rigid bodies with momentum and angular momentum in three dimensions, smooth contacts.
+rigid bodies with momentum and angular momentum in three dimensions, drag and friction.
 """
 
 from __future__ import annotations
