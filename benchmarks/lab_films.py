@@ -2,9 +2,10 @@
 
 Spheres, container, restitutions, colours, light and camera are drawn; the engines
 (`benchmarks.soft_spheres`, and `benchmarks.turning_gas` where spheres stick) and the camera
-(`benchmarks.shaded_film`) share nothing with the package. Each film is measured by `nanorocks_ros.measure`, told what can be read off a picture or a
-ruler. ``NANOROCKS_FILM_COUNT`` is the number of films of each row, 4 by default. Films and results
-are kept in `filmed_cycles.folder`, so that an interrupted run goes on.
+(`benchmarks.shaded_film`) share nothing with the package. Each film is measured by
+`nanorocks_ros.measure`, told what can be read off a picture or a ruler. ``NANOROCKS_FILM_COUNT``
+is the number of films of each row, 4 by default. Films and results are kept in
+`filmed_cycles.folder`, so that an interrupted run goes on.
 ``python -m benchmarks.lab_films PICTURE`` shows a frame of the first films.
 """
 
