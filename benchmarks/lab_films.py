@@ -310,7 +310,8 @@ def _row(film: LabFilm, held: dict[str, list[bool]]) -> str:
 
 def _sticking(film: LabFilm, found: dict[str, float], held: dict[str, list[bool]]) -> str:
     lower, upper = (found.get(f'sticking_speed_{end}', math.nan) for end in ('lower', 'upper'))
-    if math.isfinite(upper):
+    # Any limit holds where nothing sticks.
+    if film.sticking and math.isfinite(upper):
         low = lower if math.isfinite(lower) else 0.0
         held.setdefault('sticking speed', []).append(low <= film.sticking <= upper)
     shown = {name: 1e3 * value for name, value in found.items()}
