@@ -109,7 +109,9 @@ def evaluate(
         offset = (best - first) / step
         _look_up(slopes[place], log_time / step + offset, columns[2:])
         columns[n_z - 2] = camera[0] * (columns[1] - 1.0)
-        columns[n_z - 1] = camera[1] * (log_speed - middle)
+        # The expected speeds: measured ones share their noise with the residuals, and over many
+        # cycles that would count as a bias of the camera.
+        columns[n_z - 1] = camera[1] * (log_speed - columns[0] - middle)
         _drag_column(log_time, camera[2], camera[3], columns[1], columns[n_z])
         _start_column(log_time, camera[2], camera[4], columns[1], columns[n_z + 1])
         whiten(factor, columns, 2 + n_z)

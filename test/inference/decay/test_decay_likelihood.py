@@ -198,3 +198,33 @@ def test_a_film_of_other_speeds_than_expected_is_read_as_one_of_those(tables, fa
     _, other, _ = restitution(time / faster, speed * faster)
 
     assert abs(other - value) < 0.1 * (upper - lower)
+
+
+def test_fluctuations_of_speeds_are_no_bias_of_the_camera(tables):
+    # What measured speeds share with their residuals is small beside the scatter of one cycle.
+    cycles, bias = 400, 0.01
+    library = tables.decays
+    beads, walls = np.meshgrid(tables.restitution, tables.wall_restitution, indexing='ij')
+    place = int(np.argmin(np.hypot(beads.ravel() - 0.85, walls.ravel() - 0.95)))
+    table = np.tensordot(
+        tables.shares[place],
+        library.covariance.reshape(-1, *library.covariance.shape[2:])[tables.corners[place]],
+        1,
+    )
+    distances, start = np.log(library.distances), math.exp(tables.start[0])
+    time = np.exp(distances[35:50]) / start
+    fluctuations = np.random.default_rng(3).multivariate_normal(
+        np.zeros(time.size), table[35:50, 35:50], cycles
+    )
+    mean = start * np.exp(tables.mean[place, 35:50])
+    total = None
+    for fluctuation in fluctuations:
+        speed = mean * np.exp(fluctuation)
+        decay = decay_likelihood(
+            tables, time, speed, 1e-3 * speed, (0.0, bias), highest_friction=0.0
+        )
+        total = decay if total is None else total + decay
+    of_bias = tables.slopes.shape[1] + 1
+    gradient = total.gradient[place, of_bias]
+    error = math.sqrt(total.information[place, of_bias, of_bias])
+    assert abs(gradient) < 3.0 * error
