@@ -21,6 +21,7 @@ from nanorocks_ros.records import (
     TrayImage,
 )
 from nanorocks_ros.stages.speed.jumping_tracks import JumpingTracks
+from nanorocks_ros.stages.speed.lost_grains import LostGrains
 from nanorocks_ros.stages.speed.skipped_frames import SkippedFrames
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (
@@ -85,6 +86,7 @@ class TrackSpeed:
         self._recent = TrackWindow()
         self._jumps = JumpingTracks(self._pixels_per_metre) if self._flagged_path else None
         self._skipped = SkippedFrames(self._pixels_per_metre)
+        self._lost_grains = self._grains()
         self._next_ns: int | None = None
         self._last: SpeedEstimate | None = None
         self._flags = Quality(0)
@@ -129,11 +131,16 @@ class TrackSpeed:
         if self._cycle not in (None, image.cycle):
             self._recent.clear()
             self._skipped = SkippedFrames(self._pixels_per_metre)
+            self._lost_grains = self._grains()
             self._next_ns = None
         self._cycle, self._cycle_start_ns = image.cycle, image.cycle_start_ns
         self._flags |= image.quality
         if image.color is None:
             self.reliability.without_colour()
+
+    def _grains(self) -> LostGrains | None:
+        """Counts grains that are lost in a cycle; None where there are none."""
+        return LostGrains(1 + len(self._tray.species)) if self._flagged_path else None
 
     def _speeds_told_apart(
         self, speeds: list[Measured], intervals_ns: NDArray[np.int64]
@@ -147,7 +154,7 @@ class TrackSpeed:
 
     def _speeds(self, tracks: Tracks) -> tuple[SpeedEstimate, ...]:
         series = self._recent.series()
-        mean, *of_species = mean_speeds_of_series(
+        means = mean_speeds_of_series(
             series,
             self._recent.series(NOISE_FRAMES),
             tracks.expected,
@@ -156,6 +163,7 @@ class TrackSpeed:
             loss_bias=CUT_LOSS_BIAS if self._jumps else LOSS_BIAS,
             floor=self._tray.dimensions[:2],
         )
+        mean, *of_species = self._lost_grains.counted(means) if self._lost_grains else means
         if mean is None or not np.isfinite(mean.mean_projected_speed):
             return ()
         if self._last is not None and mean.stamp_ns <= self._last.stamp_ns:
