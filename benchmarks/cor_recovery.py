@@ -1,11 +1,12 @@
 """Restitutions from simulated decays against their truth: bias, scatter and coverage.
 
 True mean projected speeds with errors of 2 %, 1.75 to 20 s after a start at a mean speed of
-10 mm/s, of runs that are in no library. "Walls known": the prior gives the restitution of the
-walls, and nothing else is uncertain; an estimate uses 1 cycle, or 18 cycles with the misfit of the
-library. "Nothing known but the priors": all values are drawn from the defaults of `prior.` for
-each run: walls from 0.8 to 1, floor and lid, height, diameter, count and initial speeds. This is
-the case of one cycle with default settings. "The law itself": Haff's law alone, on which the
+10 mm/s, of runs that are in no library; that beads do not rub is known. "Walls known": the prior
+gives the restitution of the walls, and nothing else is uncertain; an estimate uses 1 cycle, or 18
+cycles with the errors of the camera and the misfit of the library, which they have in common.
+"Nothing known but the priors": all values are drawn from the defaults of `prior.` for each run:
+walls from 0.5 to 1, floor and lid, height, diameter, count and initial speeds. This is the case of
+one cycle of smooth beads with default settings. "The law itself": Haff's law alone, on which the
 relation of the paper is based; its interval of the decay rate 1/(v0 tau) is compared with the same
 fit to the mean decay of all runs.
 """
@@ -39,6 +40,9 @@ from nanorocks_ros.simulation.ensemble import cooling_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from nanorocks_ros.inference.decay.decay_library import DecayLibrary
+    from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
 
 _TRAYS = (1, 3, 5)
 # Trays with chalk and with grains, with fewer truths.
@@ -141,9 +145,7 @@ def _known_walls(case: _Case) -> tuple[str, str]:
     likelihood = partial(_likelihood, tables, (0.0, 0.0))
     for number, speed in enumerate(_speeds(case, tray, {}, range(_RUNS))):
         singles.append(posterior_of(tables, likelihood(speed), walls).quantiles(_LEVELS))
-        likelihood_of_cycle = decay_likelihood(
-            tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0)
-        )
+        likelihood_of_cycle = _decay(tables, _camera(library), speed)
         total = likelihood_of_cycle if total is None else total + likelihood_of_cycle
         if number % _TOGETHER == _TOGETHER - 1:
             posterior = posterior_of(tables, total.integrated(), walls)
@@ -168,9 +170,7 @@ def _many_cycles(case: _Case) -> tuple[str, str]:
         first = 1000 * (group + 1)
         total = None
         for speed in _speeds(case, tray, {}, range(first, first + _ALL_CYCLES)):
-            likelihood_of_cycle = decay_likelihood(
-                tables, _TIMES, speed, _ERROR * speed, (library.misfit, 0.0)
-            )
+            likelihood_of_cycle = _decay(tables, _camera(library), speed)
             total = likelihood_of_cycle if total is None else total + likelihood_of_cycle
         assert total is not None
         posterior = posterior_of(tables, total.integrated(), (case.wall, case.wall))
@@ -204,10 +204,10 @@ def _by_the_law(case: _Case) -> tuple[str, str]:
 
 def _drawn_from_priors(case: _Range) -> tuple[str, str]:
     tray = load_trays()[case.tray]
-    prior = PriorSettings(min_wall_restitution=0.8)
+    prior = PriorSettings()
     library = library_of(tray)
     tables = tables_of(library, tray, prior)
-    camera = (math.hypot(prior.scale_error, library.misfit), prior.speed_bias)
+    camera = _camera(library)
     beads, walls = [], []
     for number in range(_RUNS):
         random = np.random.default_rng([7, case.tray, number])
@@ -231,8 +231,19 @@ def _drawn_from_priors(case: _Range) -> tuple[str, str]:
     return head, row + f'| {width:.3f} ' + _judged(np.array(walls), 0.0) + '|'
 
 
+def _camera(library: DecayLibrary) -> tuple[float, float]:
+    """Errors of the camera by default, with the misfit of the library."""
+    prior = PriorSettings()
+    return math.hypot(prior.scale_error, library.misfit), prior.speed_bias
+
+
+def _decay(tables: DecayTables, camera: tuple[float, float], speed: np.ndarray) -> DecayLikelihood:
+    """Likelihood of the decay of beads that are known not to rub."""
+    return decay_likelihood(tables, _TIMES, speed, _ERROR * speed, camera, highest_friction=0.0)
+
+
 def _likelihood(tables: DecayTables, camera: tuple[float, float], speed: np.ndarray) -> np.ndarray:
-    return decay_likelihood(tables, _TIMES, speed, _ERROR * speed, camera).integrated()
+    return _decay(tables, camera, speed).integrated()
 
 
 def _judged(estimates: np.ndarray, truth: float) -> str:

@@ -5,7 +5,7 @@ One tray in a video file, with light, lens, sensor, codec, scale and frame rate 
 A film with drag, friction, sticking or a law of the restitution has the tray and the camera of the
 film without.
 
-Films and results are kept (`filmed_cycles.folder`), results under a key of the source code: an
+Films and results are kept (`kept_results.folder`), results under a key of the source code: an
 interrupted run goes on where it was.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.drawn import varied
 from benchmarks.film_measurement import FilmResult, is_flagged, measure
 from benchmarks.film_truth import FilmTruth, read_truth
-from benchmarks.filmed_cycles import folder
+from benchmarks.kept_results import folder
 from benchmarks.rough_gas import SMOOTH, Roughness
 from benchmarks.source_key import source_key
 from nanorocks_ros.cli.progress_bar import Progress

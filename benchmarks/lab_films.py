@@ -5,7 +5,7 @@ Spheres, container, restitutions, colours, light and camera are drawn; the engin
 (`benchmarks.shaded_film`) share nothing with the package. Each film is measured by
 `nanorocks_ros.measure`, told what can be read off a picture or a ruler. ``NANOROCKS_FILM_COUNT``
 is the number of films of each row, 4 by default. Films and results are kept in
-`filmed_cycles.folder`, so that an interrupted run goes on.
+`kept_results.folder`, so that an interrupted run goes on.
 ``python -m benchmarks.lab_films PICTURE`` shows a frame of the first films.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 
 import nanorocks_ros as nr
 from benchmarks.drawn_films import film_count
-from benchmarks.filmed_cycles import folder
+from benchmarks.kept_results import folder
 from benchmarks.shaded_film import (
     EXPOSURES,
     LabCamera,

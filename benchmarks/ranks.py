@@ -4,7 +4,7 @@ Truths are drawn from the priors of the inference: beads 0 to 1, walls 0.5 to 1,
 lid, initial speeds, scale and bias of the speeds; each gives one cycle of 20 s. In a right
 posterior the rank of the truth, the probability below it, is uniform from 0 to 1
 (Talts et al. 2018, arXiv:1804.06788). "Decay": true mean speeds with errors of 2 %. "All": with
-contacts in true tracks with the errors of tracking. Results are kept (`filmed_cycles.folder`)
+contacts in true tracks with the errors of tracking. Results are kept (`kept_results.folder`)
 under a key of the source code: a command that was interrupted continues. The decays have a key of
 the code that simulates, so that after a change of the inference only that is repeated.
 """
@@ -23,7 +23,7 @@ from scipy import stats
 
 from benchmarks.contacts import contacts_of, true_tracks
 from benchmarks.drawn import varied
-from benchmarks.filmed_cycles import folder
+from benchmarks.kept_results import folder
 from benchmarks.source_key import key_of
 from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.experiment.trays import load_trays

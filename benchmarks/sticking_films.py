@@ -2,8 +2,8 @@
 
 Plates of eight cells, four like tray 1 and four like tray 3 or 5, JPEG 85, 26 s after a shaking
 event at 10 mm/s, restitutions 0.89 and 0.97; sizes come from tracks. In a sticking film each of
-the four cells has its own sticking speed; controls are without sticking. Tracks are kept as in
-`cor_films`, and bodies are counted in each run.
+the four cells has its own sticking speed; controls are without sticking. Tracks are kept
+(`kept_results.folder`), and bodies are counted in each run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from benchmarks.filmed_cycles import PLACES, folder
+from benchmarks.kept_results import folder
 from benchmarks.sticking import true_merges
 from nanorocks_ros.experiment.trays import Tray, load_trays
 from nanorocks_ros.experiment.view import View
@@ -46,6 +46,12 @@ from nanorocks_ros.simulation.plate_scene.plate_film import SceneFilm
 from nanorocks_ros.stages.bodies.body_counter import BodyCounter
 from nanorocks_ros.stages.preprocess.frame_preprocessor import Preprocessor
 
+# Positions of the eight cells of the plate, four of tray 1 and four of tray 3, [mm]: one film
+# gives eight cycles.
+_PLACES = {
+    1: ((4.0, 5.0), (23.0, 5.0), (42.0, 5.0), (61.0, 5.0)),
+    3: ((42.0, 25.0), (42.0, 41.0), (4.0, 60.0), (42.0, 60.0)),
+}
 _STICKING = (1e-3, 3e-3, 5e-3, 10.4e-3)
 _FILMS, _CONTROLS = 12, 7
 _SECONDS, _SHAKE = 26.5, 0.5
@@ -241,7 +247,7 @@ def _make(task: tuple[int, bool]) -> None:
     flown = load_trays()
     cells: dict[int, Tray] = {}
     tray_of_cell: dict[int, int] = {}
-    for default_tray, places in PLACES.items():
+    for default_tray, places in _PLACES.items():
         tray = 5 if default_tray == 3 and number % 2 else default_tray
         for x, y in places:
             cell = len(cells) + 1
