@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.inference.decay.friction_weights import FrictionWeights
 
+MOST_CYCLES = 30.0
+"""What many decays say at most, as so many cycles: errors of the library, of its covariance and of
+the linear nuisances are common to all, and do not average out. Decays of 180 simulated cycles read
+the beads 0.02 to 0.06 off with a stated error of 0.002 to 0.009."""
 SCALES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 """Where a badly known scale is sampled, in its standard deviations; linear within half of one."""
 
@@ -32,9 +36,9 @@ class DecayLikelihood:
     Parameters
     ----------
     log_likelihood : ndarray (n_places,)
-        At the expected nuisances and the best amplitude, with the prior of that.
+        At the expected nuisances and the best amplitude.
     start : ndarray (n_places,)
-        What the integral over the amplitude adds to it.
+        What the prior of the amplitude and the integral over it add.
     gradient : ndarray (n_places, n_z)
         Its derivative by the nuisances, in units of their standard deviations.
     information : ndarray (n_places, n_z, n_z)
@@ -104,13 +108,15 @@ class DecayLikelihood:
     def _integrated(self) -> NDArray[np.float64]:
         log_likelihood = np.empty(self.log_likelihood.shape)
         n_z = self.gradient.shape[-1]
+        decays = max(self.decays, 1)
+        part = 1.0 / (1.0 + (decays - 1) / MOST_CYCLES)
         integrate(
-            np.ascontiguousarray(self.gradient).reshape(-1, n_z),
-            np.ascontiguousarray(self.information).reshape(-1, n_z, n_z),
+            np.ascontiguousarray(part * self.gradient).reshape(-1, n_z),
+            np.ascontiguousarray(part * self.information).reshape(-1, n_z, n_z),
             log_likelihood.reshape(-1),
         )
         # Cycles start alike: a sum over many would favour restitutions that forget their starts.
-        log_likelihood += self.log_likelihood + self.start / max(self.decays, 1)
+        log_likelihood += part * self.log_likelihood + self.start / decays
         if log_likelihood.ndim == 1:
             return np.asarray(log_likelihood)
         weight = np.exp(-0.5 * SCALES**2)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 import pytest
@@ -200,31 +203,49 @@ def test_a_film_of_other_speeds_than_expected_is_read_as_one_of_those(tables, fa
     assert abs(other - value) < 0.1 * (upper - lower)
 
 
-def test_fluctuations_of_speeds_are_no_bias_of_the_camera(tables):
-    # What measured speeds share with their residuals is small beside the scatter of one cycle.
-    cycles, bias = 400, 0.01
+def simulated(tables, cycles, bias):
+    """Decays as the library knows them, and the place on the grid."""
     library = tables.decays
     beads, walls = np.meshgrid(tables.restitution, tables.wall_restitution, indexing='ij')
-    place = int(np.argmin(np.hypot(beads.ravel() - 0.85, walls.ravel() - 0.95)))
+    place = int(np.argmin(np.hypot(beads.ravel() - 0.7, walls.ravel() - 0.95)))
     table = np.tensordot(
         tables.shares[place],
         library.covariance.reshape(-1, *library.covariance.shape[2:])[tables.corners[place]],
         1,
     )
-    distances, start = np.log(library.distances), math.exp(tables.start[0])
-    time = np.exp(distances[35:50]) / start
+    part = slice(14, 40)
+    start = math.exp(tables.start[0])
+    mean = start * np.exp(tables.mean[place, part])
     fluctuations = np.random.default_rng(3).multivariate_normal(
-        np.zeros(time.size), table[35:50, 35:50], cycles
+        np.zeros(mean.size), table[part, part], cycles
     )
-    mean = start * np.exp(tables.mean[place, 35:50])
-    total = None
-    for fluctuation in fluctuations:
-        speed = mean * np.exp(fluctuation)
-        decay = decay_likelihood(
-            tables, time, speed, 1e-3 * speed, (0.0, bias), highest_friction=0.0
-        )
-        total = decay if total is None else total + decay
+    speeds = mean * np.exp(fluctuations)
+    time = library.distances[part] / start
+    decays = [
+        decay_likelihood(tables, time, speed, 1e-3 * speed, (0.0, bias), highest_friction=0.0)
+        for speed in speeds
+    ]
+    return reduce(add, decays), place
+
+
+def test_fluctuations_of_speeds_are_no_bias_of_the_camera(tables):
+    # What measured speeds share with their residuals is small beside the scatter of one cycle.
+    total, place = simulated(tables, cycles=400, bias=0.01)
     of_bias = tables.slopes.shape[1] + 1
-    gradient = total.gradient[place, of_bias]
     error = math.sqrt(total.information[place, of_bias, of_bias])
-    assert abs(gradient) < 3.0 * error
+    assert abs(total.gradient[place, of_bias]) < 3.0 * error
+
+
+def many(likelihood, cycles):
+    return reduce(add, [likelihood] * cycles)
+
+
+def test_many_cycles_say_no_more_than_as_many_as_are_told_apart_from_common_errors(tables):
+    one = replace(
+        decay_likelihood(tables, TIMES, SPEEDS, 0.02 * SPEEDS, (0.0, 0.0), highest_friction=0.0),
+        start=np.zeros(tables.mean.shape[0]),
+    )
+    one = replace(one, gradient=0.0 * one.gradient, information=0.0 * one.information)
+    alone = np.ptp(one.integrated())
+    assert np.ptp(many(one, 2).integrated()) == pytest.approx(1.94 * alone, rel=0.01)
+    assert 29.0 * alone < np.ptp(many(one, 1000).integrated()) < 30.0 * alone
