@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.experiment.trays import load_trays
-from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings
 from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.stages.contacts.cycle_contacts import CycleContacts
 from nanorocks_ros.stages.restitution.decay_library_method import DecayLibraryMethod
 from nanorocks_ros.stages.restitution.restitution_method import Decay
 from nanorocks_ros.studies.libraries.library_nodes import LibraryPlan, cool_node
@@ -68,7 +68,8 @@ def _fits() -> tuple[float, float]:
     )
     (speed,) = cooling_runs(settings, tray, _TIMES, [0]).mean_projected_speed
     decay = Decay(time=_TIMES, speed=speed, error=_ERROR * speed)
-    method, none = DecayLibraryMethod(PipelineSettings(), tray), ContactTerms.of(())
+    pipeline = PipelineSettings()
+    method, none = DecayLibraryMethod(pipeline, tray), CycleContacts(pipeline.cooling)
     return (
         _cost(lambda: method.estimate(decay, none, final=False), _REPEATS),
         _cost(lambda: fit_haff(_TIMES, speed, _ERROR * speed, tray.count), _REPEATS),
