@@ -20,8 +20,8 @@ from nanorocks_ros.records import (
     Tracks,
     TrayImage,
 )
-from nanorocks_ros.stages.speed.jumping_tracks import JumpingTracks
-from nanorocks_ros.stages.speed.lost_grains import LostGrains
+from nanorocks_ros.stages.speed.grains.jumping_tracks import JumpingTracks
+from nanorocks_ros.stages.speed.grains.lost_grains import LostGrains
 from nanorocks_ros.stages.speed.skipped_frames import SkippedFrames
 from nanorocks_ros.stages.speed.track_reliability import TrackReliability
 from nanorocks_ros.stages.tracking.mean_speed import (

@@ -7,7 +7,7 @@ drawn films of tray 7. They count as 3/4 of it here, so that it is multiplied by
 error of f / sqrt(12). How many a camera cannot follow at all plays no role. Slow speeds were up to
 37 % high without it.
 
-Tested by ``test/stages/speed/test_lost_grains.py``.
+Tested by ``test/stages/speed/grains/test_lost_grains.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A grain that others hide in part is found beside its place, or where two of them
 found elsewhere a few pictures later; its track jumps with it. Such jumps made the mean speed of
 the grains of tray 7 up to 16 % too high in drawn films.
 
-Tested by ``test/stages/speed/test_jumping_tracks.py``.
+Tested by ``test/stages/speed/grains/test_jumping_tracks.py``.
 """
 
 from __future__ import annotations

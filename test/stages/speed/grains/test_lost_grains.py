@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from nanorocks_ros.stages.speed.lost_grains import LostGrains
+from nanorocks_ros.stages.speed.grains.lost_grains import LostGrains
 from nanorocks_ros.stages.tracking.mean_speed import MeanSpeed
 
 SPEED, ERROR = 1e-3, 5e-5

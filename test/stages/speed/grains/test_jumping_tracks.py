@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bead_paths import tracks_of
 
-from nanorocks_ros.stages.speed.jumping_tracks import JumpingTracks
+from nanorocks_ros.stages.speed.grains.jumping_tracks import JumpingTracks
 
 SCALE = 10_000.0
 STEP = 5e-5
