@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from nanorocks_ros.inference.decay.friction_weights import FrictionWeights
 
 MOST_CYCLES = 30.0
-"""What many decays say at most, as so many cycles: errors of the library, of its covariance and of
-the linear nuisances are common to all, and do not average out. Decays of 180 simulated cycles read
-the beads 0.02 to 0.06 off with a stated error of 0.002 to 0.009."""
+"""Many decays say at most what so many would: errors of the library, of its covariance and of the
+linear nuisances are common to all, and do not average out. Decays of 180 simulated cycles read the
+beads 0.02 to 0.06 off with a stated error of 0.002 to 0.009."""
 SCALES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 """Where a badly known scale is sampled, in its standard deviations; linear within half of one."""
 
@@ -36,9 +36,9 @@ class DecayLikelihood:
     Parameters
     ----------
     log_likelihood : ndarray (n_places,)
-        At the expected nuisances and the best amplitude.
+        At the expected nuisances and the best amplitude, with the prior of that.
     start : ndarray (n_places,)
-        What the prior of the amplitude and the integral over it add.
+        What the integral over the amplitude adds to it.
     gradient : ndarray (n_places, n_z)
         Its derivative by the nuisances, in units of their standard deviations.
     information : ndarray (n_places, n_z, n_z)
