@@ -201,7 +201,8 @@ def _as_tracks(picture: _TrayView, beads: MarkedBeads, tray: Tray, error: float)
         radii=unknown,
         radius_errors=unknown,
         seen=np.ones(count, dtype=bool),
-        expected=np.array([tray.count], dtype=np.int32),
+        # Beads that nobody marked are not lost.
+        expected=np.array([count], dtype=np.int32),
     )
 
 

@@ -74,6 +74,17 @@ def test_calibrated_speeds_are_nearer_to_the_truth(bag, marks, tmp_path, capsys)
     assert abs(calibrated[0] - 1.0) < 0.5 * abs(raw[0] - 1.0)
 
 
+def test_four_marked_beads_of_fifteen_calibrate_as_well(bag, marks, tmp_path, capsys):
+    ids = sorted({int(line.split(',')[1]) for line in marks.read_text().splitlines()[1:]})[:4]
+    few = [line for line in marks.read_text().splitlines()[1:] if int(line.split(',')[1]) in ids]
+    (tmp_path / 'few.csv').write_text('\n'.join(['frame,id,x,y', *few]), encoding='utf-8')
+    windows = []
+    for file in (marks, tmp_path / 'few.csv'):
+        assert main(call(bag, file, '--json')) == 0
+        windows.append(json.loads(capsys.readouterr().out)['trays']['1']['windows'])
+    assert windows[1] > 0.8 * windows[0]
+
+
 def test_a_calibration_that_is_set_already_is_no_part_of_the_next(bag, marks, tmp_path, capsys):
     assert main(call(bag, marks, '-o', str(tmp_path / 'area.yaml'), '--json')) == 0
     once = capsys.readouterr().out
