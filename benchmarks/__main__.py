@@ -5,6 +5,8 @@
 ``python -m benchmarks kills [OPTION ...]`` kills jobs at random instants and resumes them.
 ``python -m benchmarks signals [OPTION ...]`` interrupts recordings at random instants.
 ``python -m benchmarks structure [COMMIT]`` counts modules and lines.
+``python -m benchmarks documented OUTPUT ... [--renew]`` compares the documentation with what
+benchmarks printed.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from benchmarks import fuzz, golden, kills, signals, structure
+from benchmarks import documented, fuzz, golden, kills, signals, structure
 
 ALL = (
     'cold_start',
@@ -84,7 +86,9 @@ ALL = (
 
 
 def main() -> int:
-    """Run each benchmark and print its report, or one of the five checks."""
+    """Run each benchmark and print its report, or one of the six checks."""
+    if sys.argv[1:2] == ['documented']:
+        return documented.main(sys.argv[2:])
     if sys.argv[1:2] == ['golden']:
         return golden.main(sys.argv[2:])
     if sys.argv[1:2] == ['fuzz']:

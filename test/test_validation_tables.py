@@ -12,15 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import documented
+from benchmarks.documented import documented_tables
+
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / 'docs').rglob('*.md'))
-# Pages of results. On the other pages the command is named beside its table.
-RESULTS = ROOT / 'docs' / 'validation'
-BESIDE = 8
-COMMAND = re.compile(r'python -m\s+benchmarks[. ](\w+)')
-RULE = re.compile(r'\|( *:?-+:? *\|)+$')
-# Above a table that no command prints in this form.
-BY_HAND = '<!-- table by hand -->'
 
 
 @cache
@@ -70,23 +66,11 @@ def is_printed(cell, module):
     )
 
 
-def tables(page):
-    """Number of the line, header and nearest benchmark of each table of a page."""
-    lines = page.read_text(encoding='utf-8').splitlines()
-    for k, line in enumerate(lines):
-        if not RULE.fullmatch(line):
-            continue
-        if BY_HAND in lines[max(k - 3, 0) : k - 1]:
-            continue
-        header = [cell.strip().strip('`') for cell in lines[k - 1].strip('|').split('|')]
-        above = lines[:k] if page.parent == RESULTS else lines[max(k - BESIDE, 0) : k]
-        named = COMMAND.findall('\n'.join(above))
-        if page.parent != RESULTS and not named:
-            continue
-        yield k, [cell for cell in header if cell], named[-1] if named else None
-
-
-TABLES = [(page.name, *table) for page in PAGES for table in tables(page)]
+TABLES = [
+    (page.name, table.line, table.columns, table.benchmark)
+    for page in PAGES
+    for table in documented_tables(page)
+]
 
 
 def test_the_pages_have_tables():
@@ -106,3 +90,60 @@ def test_a_column_that_nobody_prints_is_told():
     assert is_printed('truth ep, ew', 'closed_forms')
     assert is_printed('in 5 together', 'speed_dependence')
     assert not is_printed('truth ep', 'closed_forms')
+
+
+PRINTED = """
+## closed_forms: Rates.
+
+| tray | rate |
+| --- | --- |
+| 1 | 0.3 |
+| 3 | 0.4 |
+
+| other |
+| --- |
+| 1 |
+"""
+PAGE = """# Rates
+
+`python -m benchmarks closed_forms`:
+
+| tray | `rate` |
+| --- | --- |
+| 1 | 0.2 |
+
+They fall.
+"""
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    page = tmp_path / 'docs' / 'rates.md'
+    page.parent.mkdir()
+    page.write_text(PAGE)
+    (tmp_path / 'printed.txt').write_text(PRINTED)
+    monkeypatch.setattr(documented, '_DOCS', page.parent)
+    return page
+
+
+def test_rows_that_differ_are_told(page, capsys):
+    assert documented.main([str(page.parents[1] / 'printed.txt')]) == 1
+    told = capsys.readouterr().out
+    assert 'docs/rates.md:5: closed_forms' in told
+    assert '- | 1 | 0.2 |' in told
+    assert '+ | 1 | 0.3 |' in told
+    assert '1 tables compared, 1 differ; 1 stand nowhere' in told
+    assert page.read_text() == PAGE
+
+
+def test_printed_rows_replace_those_of_the_page(page):
+    output = str(page.parents[1] / 'printed.txt')
+    assert documented.main([output, '--renew']) == 0
+    assert page.read_text() == PAGE.replace('| 1 | 0.2 |', '| 1 | 0.3 |\n| 3 | 0.4 |')
+    assert documented.main([output]) == 0
+
+
+def test_an_output_that_is_not_there_is_named(capsys):
+    with pytest.raises(SystemExit):
+        documented.main(['nowhere.txt'])
+    assert 'no file nowhere.txt' in capsys.readouterr().err
