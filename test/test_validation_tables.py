@@ -142,7 +142,7 @@ def page(tmp_path, monkeypatch):
 def test_rows_that_differ_are_told(page, capsys):
     assert documented.main([str(page.parents[1] / 'printed.txt')]) == 1
     told = capsys.readouterr().out
-    assert 'docs/rates.md:5:' in told
+    assert f'{page.parent.name}/{page.name}:5:' in told
     assert '- | 1 | 0.2 |' in told
     assert '+ | 1 | 0.3 |' in told
     assert '2 tables compared, 2 differ; 1 stand nowhere' in told
