@@ -1,7 +1,8 @@
-"""Tracks against the truth: detected beads, links against trackpy, mean speeds, and cost.
+"""Tracks against the truth: detected beads, links against trackpy, and cost.
 
 Films of the whole plate through the lens with all effects (JPEG 85), or of single trays without
-effects. A link joins a bead in one frame to a bead in the next.
+effects. A link joins a bead in one frame to a bead in the next. Errors of positions are stated
+about a shift that all beads of a species share: scatter is that about the median error.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from nanorocks_ros.settings import PipelineSettings, TrackingSettings, with_valu
 from nanorocks_ros.stages.tracking.detection.bead_detector import BeadDetector, Detections
 from nanorocks_ros.stages.tracking.linking.flight_deviations import FlightDeviations
 from nanorocks_ros.stages.tracking.linking.track_linker import Linker
-from nanorocks_ros.stages.tracking.mean_speed import mean_speed
 from nanorocks_ros.stages.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -35,11 +35,8 @@ if TYPE_CHECKING:
 _TRAYS = (1, 2, 3, 4, 5, 6, 7)
 _WARM_UP = 45
 _FRAMES = 150
-_SPEEDS = (0.1e-3, 0.5e-3, 2e-3, 7e-3, 15e-3)
 # Gray levels added by a reflection, above which a position lies in the glare.
 _GLARE_LEVEL = 60.0
-_LEAST_DISTANCE = 1.5 / SCALE
-_NS = 1e9
 
 
 def _tracked(shots: list[Shot], tray: int) -> Iterator[tuple[Tracks, BeadsTruth]]:
@@ -76,9 +73,9 @@ def _report_counts(shots: list[Shot], film: SceneFilm) -> None:
     print('\nTracked / true beads, all effects, 7 mm/s; "outside" is outside the glare\n')
     print(
         '| tray | species | true | seen | seen, outside | followed | found and right, outside | '
-        'rms error [px] | sd of error / its error |'
+        'rms error [px] | scatter [px] | scatter / stated error |'
     )
-    print('| --- | --- | --- | --- | --- | --- | --- | --- | --- |')
+    print('| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |')
     for number in _TRAYS:
         tray = load_trays()[number]
         records = list(_tracked(shots, number))[_WARM_UP:]
@@ -90,7 +87,7 @@ def _count_row(
     records: list[tuple[Tracks, BeadsTruth]], film: SceneFilm, number: int, index: int, name: str
 ) -> str:
     seen, seen_outside, followed, right, true, outside = [], [], [], [], [], []
-    errors, pulls = [np.empty((0, 2))], [np.empty((0, 2))]
+    errors, stated = [np.empty((0, 2))], [np.empty(0)]
     for tracks, truth in records:
         selected = truth.species == index
         places = truth.positions[selected, :2]
@@ -104,17 +101,18 @@ def _count_row(
         seen_outside.append((~_in_glare(film, number, positions)).sum())
         followed.append((tracks.species == index).sum())
         right.append(clear[rows].sum())
-        error = positions[columns] - places[rows]
-        errors.append(error * SCALE)
-        pulls.append(error / tracks.position_errors[ours][columns, None])
-    error, pull = np.concatenate(errors), np.concatenate(pulls)
+        errors.append((positions[columns] - places[rows]) * SCALE)
+        stated.append(tracks.position_errors[ours][columns] * SCALE)
+    error = np.concatenate(errors)
     if not error.size:
-        return f'| {number} | {name} | {np.mean(true):.0f} | not followed | | | | | |'
+        return f'| {number} | {name} | {np.mean(true):.0f} | not followed | | | | | | |'
+    scatter = error - np.median(error, axis=0)
+    pull = scatter / np.concatenate(stated)[:, np.newaxis]
     return (
         f'| {number} | {name} | {np.mean(true):.0f} | {np.sum(seen) / np.sum(true):.1%} | '
         f'{np.sum(seen_outside) / np.sum(outside):.1%} | {np.sum(followed) / np.sum(true):.1%} | '
         f'{np.sum(right) / np.sum(outside):.1%} | {np.sqrt(np.mean(error**2)):.2f} | '
-        f'{np.median(np.abs(pull)) / 0.6745:.1f} |'
+        f'{np.sqrt(np.mean(scatter**2)):.2f} | {np.median(np.abs(pull)) / 0.6745:.1f} |'
     )
 
 
@@ -265,46 +263,6 @@ def _judge(
     return right / links_possible, 1.0 - right / max(links_made, 1), switches / minutes
 
 
-def _report_speeds() -> None:
-    print('\nMean projected speed / truth (sd of one estimate); "!": says it is not reliable\n')
-    heads = [f'{1e3 * speed:g} mm/s' for speed in _SPEEDS]
-    print('| tray, species, effects | ' + ' | '.join(heads) + ' |')
-    print('| --- |' + ' --- |' * len(heads))
-    for effects in (False, True):
-        cells: dict[str, list[str]] = {}
-        for speed in _SPEEDS:
-            frames = _FRAMES if speed < 1e-3 else 90
-            shots, _ = filmed(
-                speed, effects=effects, frames=frames, restitution=1.0, wall_restitution=1.0
-            )
-            for number in _TRAYS:
-                for index, species in enumerate(load_trays()[number].species):
-                    name = f'{number}, {species.material}, {"all" if effects else "none"}'
-                    cells.setdefault(name, []).append(_speed_cell(shots, number, index))
-        for name, row in cells.items():
-            print(f'| {name} | ' + ' | '.join(row) + ' |', flush=True)
-
-
-def _speed_cell(shots: list[Shot], number: int, index: int) -> str:
-    records = list(_tracked(shots, number))[12:]
-    stamps = np.array([record.stamp_ns for record, _ in records])
-    true = np.array(
-        [truth.projected_speeds[truth.species == index].mean() for _, truth in records]
-    )
-    ratios, reliable = [], []
-    for count in range(40, len(records), 5):
-        tracks = [record for record, _ in records[:count]]
-        speed = mean_speed(tracks, least_distance=_LEAST_DISTANCE, species=index)
-        if speed is not None:
-            inside = np.abs(stamps - speed.stamp_ns) <= 0.5 * speed.window * _NS + 1e6
-            ratios.append(speed.mean_projected_speed / true[inside].mean())
-            reliable.append(speed.reliable)
-    if not ratios:
-        return 'unknown'
-    flag = '' if np.mean(reliable) > 0.5 else ' !'
-    return f'{np.mean(ratios):.3f} ({np.std(ratios):.3f}){flag}'
-
-
 def _report_cost(shots: list[Shot]) -> None:
     """Print CPU time of the trackers, against decoding the same frames."""
     start = time.process_time()
@@ -343,6 +301,5 @@ def report() -> None:
         _report_counts(shots, film)
         _report_cost(shots)
         _report_links()
-        _report_speeds()
     finally:
         cv2.setNumThreads(threads)
