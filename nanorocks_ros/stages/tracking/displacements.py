@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from nanorocks_ros.records import Tracks
 
-# Largest position error of a bead that is used, over the median.
+# Largest position error of a bead that is used, over the median of its species.
 _MAX_ERROR_RATIO = 5.0
 # Largest relative difference of the two intervals between three frames for the noise.
 _MAX_INTERVAL_DIFFERENCE = 0.2
@@ -98,23 +98,28 @@ def join_tracks(tracks: Sequence[Tracks]) -> TrackSeries:
 
 @compiled
 def usable_beads(series: TrackSeries, frame: int, species: int) -> NDArray[np.int64]:
-    """Rows of the visible beads of a frame with small position errors."""
+    """Rows of the visible beads of a frame with small position errors, each in its species."""
     first, last = series.first[frame], series.first[frame + 1]
     rows = np.empty(last - first, dtype=np.int64)
-    errors = np.empty(last - first)
-    n = 0
+    n, kinds = 0, 0
     for k in range(first, last):
         if series.seen[k] and (species == ALL_SPECIES or series.species[k] == species):
-            rows[n], errors[n] = k, series.errors[k]
+            rows[n] = k
             n += 1
-    if n == 0:
-        return rows[:0]
+            kinds = max(kinds, series.species[k] + 1)
     # The position of a half hidden bead is poor; being hidden does not depend on the speed.
-    max_error = _MAX_ERROR_RATIO * median_of(errors[:n])
+    max_errors, errors = np.empty(kinds), np.empty(n)
+    for kind in range(kinds):
+        own = 0
+        for row in rows[:n]:
+            if series.species[row] == kind:
+                errors[own] = series.errors[row]
+                own += 1
+        max_errors[kind] = _MAX_ERROR_RATIO * median_of(errors[:own]) if own else 0.0
     kept = 0
-    for k in range(n):
-        if errors[k] <= max_error:
-            rows[kept] = rows[k]
+    for row in rows[:n]:
+        if series.errors[row] <= max_errors[series.species[row]]:
+            rows[kept] = row
             kept += 1
     return rows[:kept]
 

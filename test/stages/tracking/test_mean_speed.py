@@ -79,6 +79,20 @@ def test_each_species_has_a_speed_of_its_own():
     assert overall.mean_projected_speed == pytest.approx(4e-3, rel=0.03)
 
 
+def test_a_species_counts_whose_positions_are_far_better_or_worse_than_others():
+    velocities = np.zeros((20, 2))
+    velocities[:14, 0], velocities[14:, 1] = 2e-3, 6e-3
+    species = np.repeat([0, 1], [14, 6]).astype(np.int32)
+    for factor in (0.1, 10.0):
+        tracks = [
+            replace(record, position_errors=np.where(species, factor, 1.0) * 2e-6)
+            for record in _tracks(velocities, 1e-6, 30, species=species)
+        ]
+        estimate = mean_speed(tracks, least_distance=1.5 * PIXEL)
+        assert estimate.beads == 20
+        assert estimate.mean_projected_speed == pytest.approx(3.2e-3, rel=0.01)
+
+
 def test_a_speed_of_half_of_the_beads_is_not_reliable():
     tracks = list(_tracks(np.full((20, 2), 1e-3), 1e-6, 20))
     assert mean_speed(tracks, least_distance=PIXEL).reliable
