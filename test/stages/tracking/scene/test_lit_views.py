@@ -131,6 +131,28 @@ def test_flat_discs_are_left_as_they_are():
     assert np.abs(away).max() < 0.02
 
 
+@pytest.mark.parametrize('turned', [False, True])
+@pytest.mark.parametrize('stretch', [1.1, 1.25])
+def test_balls_that_a_rectified_view_stretches_are_left_where_they_are(stretch, turned):
+    # Shaded alike on all sides, as by light from the camera: what is uneven is their shape.
+    frames, truths = lit_film((0.0, 0.0, 1.0), frames=12)
+    matrix = np.diag([stretch, 1.0 / stretch]) ** 0.5
+    if turned:
+        half = np.array([[1.0, -1.0], [1.0, 1.0]]) / np.sqrt(2.0)
+        matrix = half @ matrix @ half.T
+    middle = np.array(SIZE[::-1]) / 2.0
+    moved = np.column_stack([matrix, middle - matrix @ middle])
+    frames = [cv2.warpAffine(frame, moved, SIZE[::-1], borderValue=FLOOR) for frame in frames]
+    truths = [
+        np.column_stack([truth[:, :2] @ matrix.T + moved[:, 2], truth[:, 2]]) for truth in truths
+    ]
+    model = learnt(frames)
+    assert not model.light.shifts
+    away, found = off(frames, truths, model)
+    assert found > 0.97
+    assert np.abs(away[:2]).max() < 0.01
+
+
 def test_too_few_beads_or_too_small_ones_tell_no_light():
     frames, truths = lit_film((0.5, -0.2, 0.8), frames=2)
     assert lit_sphere(frames, truths) is not None

@@ -40,7 +40,10 @@ _START = 1.05, 0.09, 0.7
 _LEAST_RADIUS, _BLURS = 0.3, (0.01, 0.5)
 # Place and radius of the disc, and the part of it that tells where the light comes from.
 _DISC, _INSIDE = (0.0, 0.0, 1.0), 0.8
-_TYPICAL = 0.05, 0.05, 0.05, 0.03, 0.3, 0.3
+# Typical changes of the parameters of a sphere, and of an ellipsoid beside them.
+_TYPICAL, _TYPICAL_STRETCH = (0.05, 0.05, 0.05, 0.03, 0.3, 0.3), (0.1, 0.1)
+# The stretch of a sphere.
+_ROUND = np.zeros(2)
 # Amounts are small where shapes hardly differ.
 _RIDGE = 1e-10
 _DERIVATIVE_STEP, _MOST_EVALUATIONS, _TOLERANCE = 1e-2, 200, 1e-4
@@ -70,8 +73,8 @@ class LitSphere(NamedTuple):
     off : float
         Root of the mean square of what the mean bead differs by, over its contrast.
     gain : float
-        The same of a sphere with place and radius of the disc, over `off`; 1 if light does not
-        shift the disc.
+        The same of an ellipsoid with place and radius of the disc, as balls show in views that
+        are rectified, over `off`; 1 if light does not shift the disc.
     slope : tuple of 2 floats
         Tangent of the angle of the light from above, across and down.
     exponent : float
@@ -89,8 +92,8 @@ class LitSphere(NamedTuple):
     @property
     def shifts(self) -> bool:
         """Whether light makes beads look smaller, or nearer to it, by more than counts."""
-        clear = math.hypot(self.across, self.down) > _CLEAR_PLACE or self.gain > _CLEAR_GAIN
-        return self.may_shift and clear
+        away = math.hypot(self.across, self.down)
+        return self.may_shift and self.gain > (1.0 if away > _CLEAR_PLACE else _CLEAR_GAIN)
 
     @property
     def may_shift(self) -> bool:
@@ -217,22 +220,21 @@ def _fitted(
     towards = np.array([(bright * x)[inside].sum(), (bright * y)[inside].sum()])
     towards /= max(float(np.hypot(*towards)), 1e-9)
 
-    def off(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        # Without the first three: of the disc itself.
-        missing = _DISC[: len(_TYPICAL) - len(parameters)]
-        every = np.concatenate([missing, parameters])
-        shapes = _shapes(every)[compared]
+    def off(
+        parameters: NDArray[np.float64], stretch: NDArray[np.float64] = _ROUND
+    ) -> NDArray[np.float64]:
+        shapes = _shapes(parameters, stretch)[compared]
         normal = shapes.T @ shapes
         normal += _RIDGE * np.trace(normal) * np.eye(len(normal))
         amounts = np.linalg.solve(normal, shapes.T @ values)
-        steep = weight * (every[4:] - usual)
+        steep = weight * (parameters[4:] - usual)
         return np.concatenate([np.ravel(values - shapes @ amounts), steep])
 
     radius, blur, tangent = _START
     usual, first = np.zeros(2), tangent * towards
     if slope is not None:
         usual, first, weight = np.array(slope), np.array(slope), _SURE * weight
-    fit = _least(off, np.array([*(-0.05 * towards), radius, blur, *first]))
+    fit = _least(off, np.array([*(-0.05 * towards), radius, blur, *first]), _TYPICAL)
     root = math.sqrt(2.0 * fit.cost / values.size)
     across, down, radius = fit.x[: len(_DISC)].tolist()
     light_across, light_down = fit.x[-2:].tolist()
@@ -240,18 +242,24 @@ def _fitted(
     sphere = LitSphere(across, down, radius, root / contrast, 1.0, towards_light, exponent)
     if not sphere.may_shift:
         return sphere
-    as_seen = _least(off, fit.x[len(_DISC) :])
+    as_seen = _least(
+        lambda parameters: off(np.concatenate([_DISC, parameters[:-2]]), parameters[-2:]),
+        np.concatenate([fit.x[len(_DISC) :], _ROUND]),
+        _TYPICAL[len(_DISC) :] + _TYPICAL_STRETCH,
+    )
     return sphere._replace(gain=math.sqrt(as_seen.cost / max(fit.cost, 1e-12)))
 
 
 def _least(
-    function: Callable[[NDArray[np.float64]], NDArray[np.float64]], start: NDArray[np.float64]
+    function: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    start: NDArray[np.float64],
+    typical: tuple[float, ...],
 ) -> OptimizeResult:
     return least_squares(
         function,
         start,
         method='lm',
-        x_scale=np.array(_TYPICAL[-len(start) :]),
+        x_scale=np.array(typical),
         diff_step=_DERIVATIVE_STEP,
         max_nfev=_MOST_EVALUATIONS,
         ftol=_TOLERANCE,
@@ -259,19 +267,25 @@ def _least(
     )
 
 
-def _shapes(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shapes(parameters: NDArray[np.float64], stretch: NDArray[np.float64]) -> NDArray[np.float64]:
     """What the picture of a lit sphere is a sum of, (_PIXELS, _PIXELS, n).
 
     Parameters
     ----------
     parameters : ndarray (6,)
         Column and row of the centre, radius, blur; slope of the light across and down.
+    stretch : ndarray (2,)
+        Of an ellipsoid: across beyond down, and along one diagonal beyond the other.
     """
     column, row, radius, blur, slope_across, slope_down = parameters.tolist()
     radius, blur = max(radius, _LEAST_RADIUS), min(max(abs(blur), _BLURS[0]), _BLURS[1])
     fine = _FINER * _PIXELS
     across, down = _places(fine)
     x, y = (across - column) / radius, (down - row) / radius
+    x, y = (
+        (1.0 - stretch[0]) * x - stretch[1] * y,
+        (1.0 + stretch[0]) * y - stretch[1] * x,
+    )
     square = x * x + y * y
     pitch = 2.0 * _REACH / fine
     cover = np.clip((1.0 - np.sqrt(square)) * radius / pitch + 0.5, 0.0, 1.0)
