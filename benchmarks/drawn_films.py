@@ -42,6 +42,8 @@ _Row = TypeVar('_Row')
 
 COUNT = 'NANOROCKS_FILM_COUNT'
 """Environment variable with the number of drawn films of each tray."""
+FIRST = 'NANOROCKS_FIRST_FILM'
+"""Environment variable with the number of the first film of a row; 0 by default."""
 
 _FILMS = 50
 # Modules beside the package that decide what is measured.
@@ -155,7 +157,8 @@ def measured_rows(
     films : int
         Of a row, where ``NANOROCKS_FILM_COUNT`` does not say it.
     """
-    numbers = range(film_count(films))
+    first = int(os.environ.get(FIRST, '0'))
+    numbers = range(first, first + film_count(films))
     draw([film(number) for number in numbers for film in rows.values()])
     for row, film in rows.items():
         videos = [video for number in numbers if (video := film(number).video)]
