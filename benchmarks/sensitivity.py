@@ -3,13 +3,15 @@
 True tracks with the errors of tracking (`benchmarks.contacts`) and mean speeds with errors of 2 %,
 20 s from 10 mm/s, restitutions 0.89 and 0.97. The truth differs from what the stages are told in
 one thing at a time. A shift is that of the headline against the ideal cycles of the same seeds;
-the ideal row itself has errors against the truth.
+the ideal row itself has errors against the truth. ``NANOROCKS_DEVIATION`` selects the rows whose
+names contain it, beside the ideal ones.
 Tested by ``test/validation/test_sensitivity.py``.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +22,7 @@ from benchmarks.accelerated_tray import AcceleratedTray
 from benchmarks.contacts import contacts_of, tracks_of
 from benchmarks.coverage import coverage
 from benchmarks.drag import FRAMES, estimate_of_tracks
+from benchmarks.rolling_shutter import RolledTray
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.records import Headline, PairCollision, Quality
 from nanorocks_ros.settings import PipelineSettings
@@ -72,6 +75,8 @@ class Deviation:
     camera_height, aside : float, [m]
         Of the camera above half the height of the tray, where the scale is as told, and from its
         middle along its length.
+    readout : float, [s]
+        From the first row of the tray that the camera reads to the last.
     """
 
     name: str
@@ -86,6 +91,7 @@ class Deviation:
     tilt: float = 0.0
     camera_height: float = math.inf
     aside: float = 0.0
+    readout: float = 0.0
 
 
 def _rubbing(friction: float) -> dict[str, float]:
@@ -117,6 +123,7 @@ DEVIATIONS = (
     Deviation(name='camera at 0.2 m', camera_height=0.2),
     Deviation(name='camera at 0.2 m, 40 mm aside', camera_height=0.2, aside=0.04),
     Deviation(name='camera at 0.12 m, 40 mm aside', camera_height=0.12, aside=0.04),
+    Deviation(name='rows of the tray read within 30 ms', readout=0.03),
 )
 
 
@@ -150,13 +157,16 @@ class SeenTray:
 
     Parameters
     ----------
-    beads : ShakenTray or AcceleratedTray
+    beads : ShakenTray, AcceleratedTray or RolledTray
     tray : Tray
     deviation : Deviation
     """
 
     def __init__(
-        self, beads: ShakenTray | AcceleratedTray, tray: Tray, deviation: Deviation
+        self,
+        beads: ShakenTray | AcceleratedTray | RolledTray,
+        tray: Tray,
+        deviation: Deviation,
     ) -> None:
         self._beads = beads
         self._middle = 0.5 * np.array(tray.dimensions)
@@ -202,9 +212,14 @@ def tracks_of_cycle(told: Tray, deviation: Deviation, run: int) -> list[Tracks]:
     """Tracks of a cycle by a tracker that never loses a bead, but those that are not tracked."""
     tray = true_tray(told, deviation)
     settings = _settings(told, deviation)
-    beads: ShakenTray | AcceleratedTray = ShakenTray(settings, tray, run)
+    beads: ShakenTray | AcceleratedTray | RolledTray
     if any(deviation.acceleration):
         beads = AcceleratedTray(settings, tray, run, deviation.acceleration)
+    elif deviation.readout:
+        shaken = ShakenTray(settings, tray, run)
+        beads = RolledTray(shaken, tray, deviation.readout, settings.frame_rate)
+    else:
+        beads = ShakenTray(settings, tray, run)
     rng = np.random.default_rng([_SEED, run])
     seen = SeenTray(beads, tray, deviation)
     return [_as_told(tracks, told) for tracks in tracks_of(seen, tray, rng, FRAMES)]
@@ -260,11 +275,14 @@ def report(cycles: int = _CYCLES) -> None:
         'holds | half-width | collisions | contacts alone | inconsistent | accelerated | drag | '
         'friction | scale |\n' + '| --- ' * 15 + '|'
     )
+    selected = os.environ.get('NANOROCKS_DEVIATION', '')
     for number in _TRAYS:
         told = load_trays()[number]
         # The ideal row has errors: what it is compared with is the truth.
         unshifted = [_TRUTH] * cycles
         for deviation in DEVIATIONS:
+            if deviation != IDEAL and selected not in deviation.name:
+                continue
             estimates, flags = zip(
                 *(cycle_of(told, deviation, run) for run in range(cycles)), strict=True
             )

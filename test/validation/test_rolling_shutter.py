@@ -1,0 +1,52 @@
+"""Beads that a rolling shutter sees, against their straight flights."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.rolling_shutter import RolledTray
+from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.settings import SimulationSettings, with_values
+from nanorocks_ros.simulation.shaken_tray import ShakenTray
+
+TRAY = load_trays()[1]
+VALUES = {'tray': 1, 'first_shake': 0.0, 'frame_rate': 30.0, 'mean_speed': 0.01, 'seed': 3}
+SETTINGS = with_values(SimulationSettings(), VALUES, 'test')
+READOUT = 0.03
+
+
+@pytest.fixture(scope='module')
+def moments():
+    exact = list(ShakenTray(SETTINGS, TRAY, 0).moments(60))
+    rolled = list(RolledTray(ShakenTray(SETTINGS, TRAY, 0), TRAY, READOUT, 30.0).moments(60))
+    return exact, rolled
+
+
+def test_free_beads_are_seen_where_they_are_when_their_row_is_read(moments):
+    free, off = 0, []
+    for exact, rolled, after in zip(moments[0], moments[1], moments[0][1:], strict=False):
+        straight = np.abs(after.velocities - exact.velocities).max(axis=1) < 1e-12
+        # Read at a time at which the bead has come to the row: it moves while others are read.
+        delay = rolled.positions[:, 1] / TRAY.dimensions[1] * READOUT
+        expected = exact.positions + exact.velocities * delay[:, np.newaxis]
+        off.append(np.abs(rolled.positions - expected)[straight].max())
+        free += straight.sum()
+    assert free > 500
+    assert max(off) < 1e-9
+
+
+def test_beads_stay_within_the_tray_and_frames_have_their_stamps(moments):
+    for exact, rolled in zip(*moments, strict=True):
+        assert rolled.truth.stamp_ns == exact.truth.stamp_ns
+        low, high = rolled.positions.min(axis=0), rolled.positions.max(axis=0)
+        assert (low > 0.9e-3).all()
+        assert (high < np.array(TRAY.dimensions) - 0.9e-3).all()
+
+
+def test_rows_that_are_read_at_once_show_the_frame():
+    gas = RolledTray(ShakenTray(SETTINGS, TRAY, 0), TRAY, 0.0, 30.0)
+    for exact, rolled in zip(
+        ShakenTray(SETTINGS, TRAY, 0).moments(5), gas.moments(5), strict=True
+    ):
+        np.testing.assert_allclose(rolled.positions, exact.positions, atol=1e-12)
