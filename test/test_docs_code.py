@@ -128,7 +128,7 @@ def test_nodes_modules_and_targets_that_pages_name_exist():
     targets = set(re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
     from benchmarks.__main__ import ALL
 
-    checks = {'golden', 'fuzz', 'kills', 'signals', 'structure'}
+    checks = {'documented', 'golden', 'fuzz', 'kills', 'signals', 'structure'}
     wrong = []
     for name, text in TEXTS.items():
         if name == 'CONTRIBUTING.md':

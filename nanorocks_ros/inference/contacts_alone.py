@@ -18,6 +18,7 @@ from nanorocks_ros.inference.contacts.dragged_contacts import (
     loss_beside_contacts,
     loss_sums,
 )
+from nanorocks_ros.inference.contacts.rolling_shutter import rolling_shutter
 from nanorocks_ros.inference.flights.flight_losses import (
     MIN_FLIGHTS,
     Slowing,
@@ -104,6 +105,7 @@ def contacts_alone(
     prior: PriorSettings,
     probability: float = 0.95,
     *,
+    sides: tuple[float, float] | None = None,
     height_known: bool = True,
     each_wall: bool = True,
 ) -> ContactsAlone:
@@ -118,6 +120,9 @@ def contacts_alone(
         Systematic errors of contacts, and what is known of the drag.
     probability : float
         Of the intervals.
+    sides : tuple of 2 floats or None, [m]
+        Of the tray: rebounds from opposite walls tell how its rows are read one after the other
+        (`rolling_shutter`). None: at once.
     height_known : bool
         Whether the height of the tray is; where walls rub floor and lid then do as well.
     each_wall : bool
@@ -129,6 +134,9 @@ def contacts_alone(
     slowing = losses.slowing if is_measured else Slowing.by_drag(Measured(prior.drag, 0.0))
     own = [_complete(dragged(contact, slowing.drag.value)) for contact in contacts]
     rebounds = [contact for contact in own if isinstance(contact, Rebound)]
+    if sides is not None:
+        shutter = rolling_shutter(rebounds, sides, prior.readout, walls_alike=False)
+        rebounds = [shutter.read_at_once(rebound) for rebound in rebounds]
     collisions = [
         contact
         for contact in own

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nanorocks_ros.settings.restitution_settings import PriorSettings
 
-_MM = 1e3
+_MM, _MS = 1e3, 1e3
 
 
 def priors_in_words(prior: PriorSettings) -> str:
@@ -38,8 +38,9 @@ def priors_in_words(prior: PriorSettings) -> str:
     return (
         f'beads 0 to 1, walls {walls}; common errors: scale {prior.scale_error:g}, collisions '
         f'{prior.collision_bias:g}, rebounds {prior.rebound_bias:g}, diameter '
-        f'{prior.diameter_error:g}, height {_MM * prior.height_error:g} mm; drag '
-        f'{prior.drag:g}{drag_error}; friction {prior.friction:g}{friction_error}; mean speed at '
-        f'the start {_MM * prior.initial_speed:g} mm/s within a factor of '
+        f'{prior.diameter_error:g}, height {_MM * prior.height_error:g} mm; readout of a side '
+        f'{_MS * prior.readout:g} ms; drag {prior.drag:g}{drag_error}; friction '
+        f'{prior.friction:g}{friction_error}; mean speed at the start '
+        f'{_MM * prior.initial_speed:g} mm/s within a factor of '
         f'{math.exp(prior.initial_speed_spread):.2g}'
     )

@@ -222,3 +222,11 @@ class PriorSettings:
         low=0.0,
         high=0.2,
     )
+    readout: float = setting(
+        0.02,
+        'standard deviation of the time in which the camera reads a side of a tray, row by row '
+        '(rolling shutter), before rebounds from opposite walls tell it; 0: all rows at once',
+        's',
+        low=0.0,
+        high=0.2,
+    )

@@ -104,6 +104,7 @@ class ContactEstimator(RestartingStage[ContactInput, CorEstimate]):
             flights,
             self._settings.prior,
             cooling.probability,
+            sides=self._tray.dimensions[:2],
             height_known=height_known,
             each_wall=False,
         )

@@ -144,7 +144,12 @@ class ContactScene(NamedTuple):
         return TrackContacts(
             contacts=tuple(contacts),
             alone=contacts_alone(
-                own, flights, settings.prior, probability, height_known=self.height_told
+                own,
+                flights,
+                settings.prior,
+                probability,
+                sides=self.tray.dimensions[:2],
+                height_known=self.height_told,
             ),
             acceleration=self.acceleration,
             walls=self.walls,

@@ -13,6 +13,7 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
+from nanorocks_ros.inference.contacts.rolling_shutter import NO_SHUTTER
 from nanorocks_ros.inference.flights.flight_losses import flight_table
 from nanorocks_ros.inference.sticking.bounce_tables import SPEEDS, BounceTables
 from nanorocks_ros.records import FreeFlight, PairCollision, Rebound
@@ -20,10 +21,11 @@ from nanorocks_ros.stages.contacts.bound_beads import bound_since, is_free
 from nanorocks_ros.stages.delays import KNOWN_AFTER_NS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from nanorocks_ros.inference.contacts.rolling_shutter import RollingShutter
     from nanorocks_ros.records import Contact, ContactOrFlight, Merge
     from nanorocks_ros.settings import CoolingSettings
 
@@ -124,7 +126,9 @@ class CycleContacts:
     def _start_sums(self) -> None:
         """Sum all contacts anew."""
         self._counted, self._new = [], self._counted + self._new
-        self._terms = ContactTerms.of(())
+        self._terms = self._rebound_terms = ContactTerms.of(())
+        self._rebounds: list[Rebound] = []
+        self._shutter = NO_SHUTTER
         self._bounces = None
 
     def next_cycle(self) -> None:
@@ -151,8 +155,24 @@ class CycleContacts:
         contacts = (*self._counted, *self._new)
         return sum(map(_is_of_body, contacts)) if self._bodies_count else 0
 
-    def terms(self, drag: float) -> ContactTerms:
-        """Likelihoods of the contacts, with speeds for about this drag of the gas, [1/s]."""
+    def terms(
+        self,
+        drag: float,
+        shutter_of: Callable[[Sequence[Rebound]], RollingShutter],
+        *,
+        final: bool,
+    ) -> ContactTerms:
+        """Likelihoods of the contacts.
+
+        Parameters
+        ----------
+        drag : float, [1/s]
+            Of the gas, for which speeds are about right.
+        shutter_of : callable
+            From rebounds to what they tell of the readout of the camera.
+        final : bool
+            Whether all rebounds are read with what they tell now, not with about that.
+        """
         bodies_count = self._free_rebounds() < _ENOUGH_FREE
         if abs(drag - self._drag) > _DRAG_STEP:
             self._drag = drag
@@ -166,16 +186,33 @@ class CycleContacts:
                 for contact in self._new
                 if bodies_count or not _is_of_body(contact)
             ]
-            self._terms += ContactTerms.of(dragged_contacts, self._sticking_speed)
+            collisions = [each for each in dragged_contacts if isinstance(each, PairCollision)]
+            self._terms += ContactTerms.of(collisions, self._sticking_speed)
+            self._rebounds += [each for each in dragged_contacts if isinstance(each, Rebound)]
             if self._sticking is not None:
-                collisions = [each for each in dragged_contacts if isinstance(each, PairCollision)]
                 tables = BounceTables.of(collisions)
                 self._bounces = tables if self._bounces is None else self._bounces + tables
             self._counted += self._new
             self._new = []
+        terms = self._terms + self._terms_of_rebounds(shutter_of, final=final)
         if self._sticking is None or self._bounces is None:
-            return self._terms
-        return replace(self._terms, beads=self._bounces.bead_table(self._sticking))
+            return terms
+        return replace(terms, beads=self._bounces.bead_table(self._sticking))
+
+    def _terms_of_rebounds(
+        self, shutter_of: Callable[[Sequence[Rebound]], RollingShutter], *, final: bool
+    ) -> ContactTerms:
+        """Likelihoods of the rebounds; all are read again where the readout is another."""
+        read = self._rebound_terms.rebounds
+        if read < len(self._rebounds) or final:
+            shutter = shutter_of(self._rebounds)
+            if shutter != self._shutter and (final or shutter.differs(self._shutter)):
+                read, self._rebound_terms = 0, ContactTerms.of(())
+                self._shutter = shutter
+            self._rebound_terms += ContactTerms.of(
+                [self._shutter.read_at_once(rebound) for rebound in self._rebounds[read:]]
+            )
+        return self._rebound_terms
 
     def restart(self, stamp_ns: int) -> None:
         """Handle time that went back to a stamp: drop the sums and all later contacts."""

@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Protocol
 from nanorocks_ros.records import Measured
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+    from nanorocks_ros.inference.contacts.rolling_shutter import RollingShutter
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
-    from nanorocks_ros.records import CorRelation
+    from nanorocks_ros.records import CorRelation, Rebound
     from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
 
 NO_AGE = Measured(0.0, 0.0)
@@ -56,8 +59,14 @@ class Contacts(Protocol):
     def flights(self) -> NDArray[np.float64]:
         """Table of the flights."""
 
-    def terms(self, drag: float) -> ContactTerms:
-        """Likelihoods of the contacts in a gas with about this drag, [1/s]."""
+    def terms(
+        self,
+        drag: float,
+        shutter_of: Callable[[Sequence[Rebound]], RollingShutter],
+        *,
+        final: bool,
+    ) -> ContactTerms:
+        """Likelihoods of the contacts, parameters as of `CycleContacts.terms`."""
 
 
 class RestitutionMethod(Protocol):

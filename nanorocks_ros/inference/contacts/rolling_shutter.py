@@ -1,0 +1,161 @@
+"""Rebounds as cameras see them that read the rows of a picture one after the other.
+
+A row at the place y is read at the time t + k y, so that a bead with the velocity v along the
+readout seems to move with v / (1 - k v): too fast with it, too slow against it. A rebound from one
+wall seems to lose less, one from the opposite wall more, the more the faster the bead. Rebounds
+from opposite walls tell k; where they do not, nothing is known of it, and contacts count as they
+are seen.
+
+Tested by ``test/inference/contacts/test_rolling_shutter.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nanorocks_ros.records import Measured, Rebound
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Student's distribution of what rebounds are off by: some are something else.
+_FREEDOM, _TURNS = 4.0, 12
+_MEDIAN_ABSOLUTE = 0.6745
+# Fewer rebounds say nothing; nor do those that leave this part of the prior of a delay and more.
+_FEWEST, _UNTOLD = 5, 0.5
+# Delays differ where one changes by this part of its error, or the error by this factor.
+_CHANGE, _SURER = 0.5, 0.7
+_NONE = Measured(0.0, 0.0)
+# Walls, and how differently they may throw beads back where they need not be alike.
+_WALLS, _SPREAD_OF_WALLS = 4, 0.1
+# Walls along rows have numbers from here on. Speeds grow at most by the inverse of this.
+_FIRST_ALONG_ROWS, _LEAST = 2, 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RollingShutter:
+    """How late rows, and columns, of a picture are read.
+
+    Parameters
+    ----------
+    along_columns, along_rows : Measured, [s/m]
+        Delay of what lies farther along each side of the tray.
+    """
+
+    along_columns: Measured = _NONE
+    along_rows: Measured = _NONE
+
+    def read_at_once(self, rebound: Rebound) -> Rebound:
+        """The rebound that a camera sees which reads all at once."""
+        delay = self.along_columns if rebound.wall < _FIRST_ALONG_ROWS else self.along_rows
+        if delay == _NONE:
+            return rebound
+        outward = delay.value if rebound.wall % 2 else -delay.value
+        incoming, outgoing = rebound.incoming, rebound.outgoing
+        before = 1.0 / max(1.0 + outward * incoming.value, _LEAST)
+        after = 1.0 / max(1.0 - outward * outgoing.value, _LEAST)
+        unknown = outgoing.value * delay.error * (incoming.value + outgoing.value)
+        return replace(
+            rebound,
+            incoming=Measured(before * incoming.value, before * incoming.error),
+            outgoing=Measured(after * outgoing.value, math.hypot(after * outgoing.error, unknown)),
+        )
+
+    def differs(self, other: RollingShutter) -> bool:
+        """Whether rebounds are to be read again where this is known in place of another."""
+        return any(
+            abs(own.value - before.value) > _CHANGE * before.error
+            or own.error < _SURER * before.error
+            or own.error > before.error / _SURER
+            for own, before in (
+                (self.along_columns, other.along_columns),
+                (self.along_rows, other.along_rows),
+            )
+        )
+
+
+NO_SHUTTER = RollingShutter()
+"""Of a camera that reads all at once."""
+
+
+def rolling_shutter(
+    rebounds: Sequence[Rebound],
+    sides: tuple[float, float],
+    readout: float,
+    *,
+    walls_alike: bool = True,
+) -> RollingShutter:
+    """What rebounds of free beads tell of the readout.
+
+    Logarithms of the ratio of both speeds are compared, by least squares with weights that make
+    far ones count less; they may depend on speed, alike at opposite walls.
+
+    Parameters
+    ----------
+    rebounds : sequence of Rebound
+    sides : tuple of 2 floats, [m]
+        Of the tray, along columns and rows.
+    readout : float, [s]
+        Standard deviation of the time in which a side is read, before rebounds tell; 0: at once.
+    walls_alike : bool
+        Whether all walls have one restitution; else only slow and fast rebounds are compared.
+    """
+    free = [rebound for rebound in rebounds if rebound.beads == 1]
+    if readout <= 0.0 or len(free) < _FEWEST:
+        return NO_SHUTTER
+    prior = readout / np.array(sides)
+    ratios, errors, shape = _ratios(free)
+    of_walls = [_SPREAD_OF_WALLS**-2.0] * _WALLS
+    if walls_alike:
+        shape, of_walls = shape[:, :-_WALLS], []
+    precision = np.diag([*prior**-2.0, 0.0, 0.0, *of_walls])
+    weights = errors**-2.0
+    for _ in range(_TURNS):
+        normal = shape.T @ (weights[:, np.newaxis] * shape) + precision
+        solution = np.linalg.solve(normal, shape.T @ (weights * ratios))
+        off = np.abs(ratios - shape @ solution) / errors
+        scale = max(float(np.median(off)) / _MEDIAN_ABSOLUTE, 1.0)
+        weights = (_FREEDOM + 1.0) / (_FREEDOM + (off / scale) ** 2) / (scale * errors) ** 2
+    spread = np.sqrt(np.diag(np.linalg.inv(normal)))[:2]
+    delays = [
+        Measured(value, error) if error < _UNTOLD * before else _NONE
+        for value, error, before in zip(
+            solution[:2].tolist(), spread.tolist(), prior.tolist(), strict=True
+        )
+    ]
+    return RollingShutter(along_columns=delays[0], along_rows=delays[1])
+
+
+def _ratios(
+    rebounds: Sequence[Rebound],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Logarithm of speed after over before, (n,), its error, and what it is a sum of, (n, 8)."""
+    incoming = np.array([(each.incoming.value, each.incoming.error) for each in rebounds])
+    outgoing = np.array([(each.outgoing.value, each.outgoing.error) for each in rebounds])
+    walls = np.array([each.wall for each in rebounds])
+    wall = np.array([each.wall_velocity.error for each in rebounds])
+    before, after = incoming[:, 0], np.maximum(outgoing[:, 0], 1e-3 * incoming[:, 0])
+    errors = np.sqrt(
+        (incoming[:, 1] / before) ** 2
+        + (outgoing[:, 1] / after) ** 2
+        + (wall * (1.0 / before + 1.0 / after)) ** 2
+    )
+    both, along_columns = before + after, walls < _FIRST_ALONG_ROWS
+    delayed = np.where(walls % 2, -both, both)
+    # A restitution that depends on speed does so alike at opposite walls.
+    shape = np.column_stack(
+        [
+            along_columns * delayed,
+            ~along_columns * delayed,
+            np.ones(len(walls)),
+            both,
+            walls[:, np.newaxis] == np.arange(_WALLS),
+        ]
+    )
+    return np.log(after / before), errors, shape
