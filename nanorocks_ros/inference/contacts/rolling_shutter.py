@@ -34,6 +34,8 @@ _CHANGE, _SURER = 0.5, 0.7
 _NONE = Measured(0.0, 0.0)
 # Walls, and how differently they may throw beads back where they need not be alike.
 _WALLS, _SPREAD_OF_WALLS = 4, 0.1
+# Standard deviation of logarithms, and the least error of one.
+_SPREAD_OF_LOGS, _LEAST_ERROR = 3.0, 1e-5
 # Walls along rows have numbers from here on. Speeds grow at most by the inverse of this.
 _FIRST_ALONG_ROWS, _LEAST = 2, 0.5
 
@@ -106,7 +108,7 @@ def rolling_shutter(
     walls_alike : bool
         Whether all walls have one restitution; else only slow and fast rebounds are compared.
     """
-    free = [rebound for rebound in rebounds if rebound.beads == 1]
+    free = [each for each in rebounds if each.beads == 1 and each.incoming.value > 0.0]
     if readout <= 0.0 or len(free) < _FEWEST:
         return NO_SHUTTER
     prior = readout / np.array(sides)
@@ -114,7 +116,9 @@ def rolling_shutter(
     of_walls = [_SPREAD_OF_WALLS**-2.0] * _WALLS
     if walls_alike:
         shape, of_walls = shape[:, :-_WALLS], []
-    precision = np.diag([*prior**-2.0, 0.0, 0.0, *of_walls])
+    # Wide enough to say nothing, also where all rebounds are equally fast.
+    of_law = [_SPREAD_OF_LOGS**-2.0, float(np.median(shape[:, 3])) ** 2 / _SPREAD_OF_LOGS**2]
+    precision = np.diag([*prior**-2.0, *of_law, *of_walls])
     weights = errors**-2.0
     for _ in range(_TURNS):
         normal = shape.T @ (weights[:, np.newaxis] * shape) + precision
@@ -158,4 +162,4 @@ def _ratios(
             walls[:, np.newaxis] == np.arange(_WALLS),
         ]
     )
-    return np.log(after / before), errors, shape
+    return np.log(after / before), np.maximum(errors, _LEAST_ERROR), shape

@@ -141,6 +141,21 @@ def test_rebounds_of_bodies_and_strays_count_little():
     assert abs(with_strays.value - without.along_rows.value) < without.along_rows.error
 
 
+@pytest.mark.parametrize('walls_alike', [True, False])
+def test_rebounds_that_are_all_alike_tell_nothing_of_a_law(walls_alike):
+    (one,) = seen(9, 1, (0.0, 0.0))
+    exact = replace(
+        one,
+        incoming=Measured(5e-3, 0.0),
+        outgoing=Measured(WALLS * 5e-3, 0.0),
+        wall_velocity=Measured(0.0, 0.0),
+    )
+    rebounds = [replace(exact, wall=wall) for wall in (0, 1, 2, 3) * 3]
+    shutter = rolling_shutter(rebounds, SIDES, PRIOR, walls_alike=walls_alike)
+    for delay in (shutter.along_columns, shutter.along_rows):
+        assert delay.value == pytest.approx(0.0, abs=1e-6)
+
+
 def test_what_is_known_better_is_told_from_what_is_known_as_well():
     delays = 0.0, READOUT / SIDES[1]
     few, more, all_of_them = (
