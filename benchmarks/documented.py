@@ -76,11 +76,13 @@ def documented_tables(page: Path) -> Iterator[Table]:
 
 
 def printed_tables(output: Path) -> Iterator[Table]:
-    """The tables that benchmarks printed, each below the heading of its own."""
+    """The tables with rows that benchmarks printed, each below the heading of its own."""
     lines = output.read_text(encoding='utf-8').splitlines()
     for k in _rules(lines):
         headings = _HEADING.findall('\n'.join(lines[:k]))
-        yield _table(output, lines, k, headings[-1] if headings else None)
+        table = _table(output, lines, k, headings[-1] if headings else None)
+        if table.rows:
+            yield table
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -110,6 +110,9 @@ PRINTED = """
 | other |
 | --- |
 | 1 |
+
+| tray | rate |
+| --- | --- |
 """
 PAGE = """# Rates
 
