@@ -2,7 +2,8 @@
 
 Spheres, container, restitutions, colours, light and camera are drawn; the engines
 (`benchmarks.soft_spheres`, and `benchmarks.turning_gas` where spheres stick) and the camera
-(`benchmarks.shaded_film`) share nothing with the package. Each film is measured by
+(`benchmarks.shaded_film`) share nothing with the package; the camera of the last films reads its
+rows one after the other, within nine tenths of the time between pictures. Each film is measured by
 `nanorocks_ros.measure`, told what can be read off a picture or a ruler. ``NANOROCKS_FILM_COUNT``
 is the number of films of each row, 4 by default. Films and results are kept in
 `kept_results.folder`, so that an interrupted run goes on.
@@ -24,6 +25,7 @@ import numpy as np
 import nanorocks_ros as nr
 from benchmarks.drawn_films import film_count
 from benchmarks.kept_results import folder
+from benchmarks.rolling_shutter import rolled_run
 from benchmarks.shaded_film import (
     EXPOSURES,
     LabCamera,
@@ -41,15 +43,19 @@ from nanorocks_ros.outputs.atomic_files import write_bytes
 
 _FILMS = 4
 _SECONDS = 24.0
-# Rows of the table: friction, drag [1/s] and sticking speed [m/s].
+# Rows of the table: friction, drag [1/s], sticking speed [m/s], and whether the shutter rolls.
 _ROWS = (
-    (0.0, 0.0, 0.0),
-    (0.05, 0.0, 0.0),
-    (0.0, 0.05, 0.0),
-    (0.0, 0.0, 3e-3),
-    (0.0, 0.03, 3e-3),
-    (0.03, 0.03, 3e-3),
+    (0.0, 0.0, 0.0, False),
+    (0.05, 0.0, 0.0, False),
+    (0.0, 0.05, 0.0, False),
+    (0.0, 0.0, 3e-3, False),
+    (0.0, 0.03, 3e-3, False),
+    (0.03, 0.03, 3e-3, False),
+    (0.0, 0.0, 0.0, True),
 )
+# States of a rolling shutter for each exposure, and parts of the readout at those of a picture.
+_STATES = 5
+_PARTS = np.linspace(0.0, 1.0, 10)
 # Colours of floor and of beads of two species, bgr.
 _COLOURS = (
     ((70.0, 40.0, 30.0), ((225.0, 232.0, 235.0), (60.0, 190.0, 230.0))),
@@ -75,12 +81,15 @@ class LabFilm:
     drag : float, [1/s]
     sticking : float, [m/s]
         Spheres stick below this normal speed, to bodies that turn; 0: never.
+    rolling : bool
+        Whether the camera reads its rows one after the other.
     """
 
     number: int
     friction: float
     drag: float
     sticking: float = 0.0
+    rolling: bool = False
 
     @property
     def video(self) -> Path:
@@ -88,6 +97,8 @@ class LabFilm:
         physics = f'{round(1e3 * self.friction)}_{round(1e3 * self.drag)}'
         if self.sticking:
             physics += f'_{round(1e3 * self.sticking)}'
+        if self.rolling:
+            physics += '_rolling'
         return folder() / 'lab_films' / f'film_{self.number}_{physics}.mp4'
 
     @property
@@ -117,8 +128,8 @@ class LabTruth:
 def report() -> None:
     """Draw and measure the films, and print a row for each."""
     films = [
-        LabFilm(number=number, friction=friction, drag=drag, sticking=sticking)
-        for friction, drag, sticking in _ROWS
+        LabFilm(number=number, friction=friction, drag=drag, sticking=sticking, rolling=rolling)
+        for friction, drag, sticking, rolling in _ROWS
         for number in range(film_count(_FILMS))
     ]
     _run('drawing films', _draw, [film for film in films if not film.video.exists()])
@@ -200,6 +211,10 @@ def _draw(film: LabFilm) -> None:
     rate = EXPOSURES * truth.camera.rate
     if film.sticking:
         run = _sticking_run(film, truth.box, rate)
+    elif film.rolling:
+        dense = soft_run(truth.box, _SECONDS, rate=_STATES * rate, seed=film.number)
+        rows = truth.camera.size[1] / truth.camera.scale
+        run = rolled_run(dense, _STATES, _PARTS, rows)
     else:
         run = soft_run(truth.box, _SECONDS, rate=rate, seed=film.number)
     film.video.parent.mkdir(parents=True, exist_ok=True)
@@ -288,7 +303,8 @@ def _row(film: LabFilm, held: dict[str, list[bool]]) -> str:
         f'{count} of {1e3 * diameter:.1f} mm'
         for count, diameter in zip(truth.counts, truth.diameters, strict=True)
     )
-    cells = [f'{film.number}', sizes, f'{film.friction:g}', f'{film.drag:g}']
+    name = f'{film.number}, rolling' if film.rolling else f'{film.number}'
+    cells = [name, sizes, f'{film.friction:g}', f'{film.drag:g}']
     if 'refusal' in found:
         return f'| {" | ".join(cells)} | {found["refusal"]} |' + ' |' * 10
     final = found.get('final', {})

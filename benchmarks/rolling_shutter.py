@@ -1,4 +1,4 @@
-"""A tray as a camera sees it that reads its rows one after the other.
+"""Beads as a camera sees them that reads its rows one after the other.
 
 Each bead is seen where it is when its row is read; between times at which the engine stops,
 places are interpolated. Tested by ``test/validation/test_rolling_shutter.py``.
@@ -6,6 +6,7 @@ places are interpolated. Tested by ``test/validation/test_rolling_shutter.py``.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from benchmarks.soft_spheres import SoftRun
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.simulation.shaken_tray import ShakenTray
 
@@ -56,15 +58,63 @@ class RolledTray:
             stops = [self._shaken.at(start + part * self._readout) for part in parts]
             places = np.array([positions for positions, _ in stops])
             motion = np.array([velocities for _, velocities in stops])
-            # Where a bead is ahead of the row that is read; rows catch up with all of them.
-            ahead = places[:, :, 1] / self._rows - parts[:, np.newaxis]
-            before = np.minimum((ahead > 0.0).sum(axis=0), _STOPS) - 1
-            before, beads = np.maximum(before, 0), np.arange(places.shape[1])
-            left, taken = ahead[before, beads], ahead[before, beads] - ahead[before + 1, beads]
-            share = (left / taken)[:, np.newaxis]
-            seen = (1.0 - share) * places[before, beads] + share * places[before + 1, beads]
+            before, share = _when_read(places[:, :, 1] / self._rows, parts)
             yield Moment(
-                positions=seen,
-                velocities=motion[before, beads],
+                positions=_between(places, before, share),
+                velocities=_between(motion, before, np.zeros_like(share)),
                 truth=self._shaken.truth(round(start * _NS), motion[0]),
             )
+
+
+def rolled_run(run: SoftRun, every: int, parts: NDArray[np.float64], rows: float) -> SoftRun:
+    """A run with many states for each picture, as seen by a rolling shutter.
+
+    Parameters
+    ----------
+    run : SoftRun
+    every : int
+        States from picture to picture.
+    parts : ndarray (n,)
+        Part of the readout at the first n states from each picture on, 0 to 1.
+    rows : float, [m]
+        From what the first row of the picture shows to what the last one does, about the middle of
+        the box.
+    """
+    middle = 0.5 * rows - 0.5 * (run.positions[0, :, 1].min() + run.positions[0, :, 1].max())
+    pictures = range(0, len(run.positions) - len(parts), every)
+    seen = []
+    for first in pictures:
+        places = run.positions[first : first + len(parts)]
+        seen.append(_between(places, *_when_read((places[:, :, 1] + middle) / rows, parts)))
+    return replace(
+        run,
+        positions=np.array(seen),
+        velocities=run.velocities[pictures],
+        displacement=run.displacement[pictures],
+    )
+
+
+def _when_read(
+    heights: NDArray[np.float64], parts: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """State before the row of each bead is read, and the part of the time to the next, both (n,).
+
+    `heights` (states, n) are rows of the beads, and `parts` (states,) the row that is read, both
+    as parts of all rows.
+    """
+    # Where a bead is ahead of the row that is read; rows catch up with all of them.
+    ahead = heights - parts[:, np.newaxis]
+    before = np.clip((ahead > 0.0).sum(axis=0) - 1, 0, len(parts) - 2)
+    beads = np.arange(heights.shape[1])
+    left = ahead[before, beads]
+    return before, left / (left - ahead[before + 1, beads])
+
+
+def _between(
+    states: NDArray[np.float64], before: NDArray[np.int64], share: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Each bead between two states (states, n, 3)."""
+    beads = np.arange(states.shape[1])
+    return (1.0 - share)[:, np.newaxis] * states[before, beads] + share[:, np.newaxis] * states[
+        before + 1, beads
+    ]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.rolling_shutter import RolledTray
+from benchmarks.rolling_shutter import RolledTray, rolled_run
+from benchmarks.soft_spheres import SoftRun
 from nanorocks_ros.experiment.trays import load_trays
 from nanorocks_ros.settings import SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
@@ -50,3 +51,23 @@ def test_rows_that_are_read_at_once_show_the_frame():
         ShakenTray(SETTINGS, TRAY, 0).moments(5), gas.moments(5), strict=True
     ):
         np.testing.assert_allclose(rolled.positions, exact.positions, atol=1e-12)
+
+
+def test_states_of_a_run_are_seen_row_by_row():
+    # Two spheres in even motion, 100 states a second, and a picture every tenth.
+    times = np.arange(100) / 100.0
+    speeds = np.array([[1e-3, 8e-3, 0.0], [0.0, -5e-3, 0.0]])
+    starts = np.array([[0.01, 0.004, 0.001], [0.01, 0.016, 0.001]])
+    positions = starts + times[:, np.newaxis, np.newaxis] * speeds
+    run = SoftRun(
+        positions=positions,
+        velocities=np.broadcast_to(speeds, positions.shape),
+        displacement=np.zeros((100, 2)),
+        collisions=0,
+    )
+    rolled = rolled_run(run, 10, np.linspace(0.0, 1.0, 10), 0.03)
+    assert len(rolled.positions) == 9
+    # The middle of both first places is that of the picture.
+    row = (rolled.positions[:, :, 1] - 0.01) / 0.03 + 0.5
+    when = 0.1 * np.arange(9)[:, np.newaxis] + 0.09 * row
+    np.testing.assert_allclose(rolled.positions, starts + when[:, :, np.newaxis] * speeds)
