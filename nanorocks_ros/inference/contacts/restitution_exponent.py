@@ -45,6 +45,8 @@ _MAX_RESTITUTION = 0.999
 # In films the speed after a contact came out this much too low, [m/s], whoever made them: contacts
 # of less than 0.6 mm/s read 0.01 to 0.02 low, others hardly. In true tracks it is 0.
 _SLOW_LOSS = Measured(4e-6, 4e-6)
+# Part of the median speed below which a speed is next to nothing: its logarithm says nothing.
+_NEXT_TO_NOTHING = 0.02
 # Part of what friction takes off beside contacts that may go with the logarithm of speed: beads
 # roll and rub at each other. With a friction of 0.03 exponents come out 0.1 too high.
 _RUBBING_ERROR = 0.5
@@ -138,9 +140,11 @@ def bead_exponent(
 
 
 def _exponent(impacts: Impacts, slowing: Slowing, bias: float) -> RestitutionExponent | None:
-    contacts = len(impacts.rows)
-    if contacts < MIN_CONTACTS:
+    speeds = impacts.speeds
+    if len(speeds) < MIN_CONTACTS:
         return None
+    impacts = impacts.part(np.flatnonzero(speeds > _NEXT_TO_NOTHING * np.median(speeds)))
+    contacts = len(impacts.rows)
     kept = kept_beside_contacts(impacts, slowing)
     rubbed = FRICTION_FACTOR * float(slowing.values[1] * impacts.rows[:, FRICTION_LENGTH].mean())
     slope_bias = math.hypot(bias, _RUBBING_ERROR * rubbed)
@@ -179,7 +183,9 @@ def kept_beside_contacts(impacts: Impacts, slowing: Slowing) -> NDArray[np.float
     friction beside a contact and of the speed that slow contacts seem to lose.
     """
     time, length, taken_out = impacts.rows[:, :LOSS_COLUMNS].T
-    reach = np.column_stack([time, FRICTION_FACTOR * length, 1.0 / impacts.speeds])
+    slowest = _NEXT_TO_NOTHING * np.median(impacts.speeds)
+    speeds = np.maximum(impacts.speeds, slowest)
+    reach = np.column_stack([time, FRICTION_FACTOR * length, 1.0 / speeds])
     covariance = np.zeros((3, 3))
     covariance[:2, :2], covariance[2, 2] = slowing.covariance, _SLOW_LOSS.error**2
     covariance[1, 1] += (FRICTION_SPREAD * slowing.values[1]) ** 2

@@ -12,7 +12,7 @@ from contact_draws import drawn_impact, drawn_rebound
 from nanorocks_ros.inference.contacts.contact_likelihood import PAIR_ERRORS
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
-from nanorocks_ros.inference.contacts.impact_tables import impact_speeds
+from nanorocks_ros.inference.contacts.impact_tables import LOSS_COLUMNS, impact_speeds
 from nanorocks_ros.inference.contacts.projected_collisions import (
     ProjectedCollisions,
     RadiusExcess,
@@ -71,6 +71,19 @@ def test_collisions_tell_the_exponent_of_the_beads(value, exponent):
         assert beads.exponent.deviation < 0.25
     assert abs(np.mean(errors)) < 0.7
     assert np.std(errors) < 1.4
+
+
+def test_collisions_next_to_without_speed_say_nothing_of_the_exponent():
+    # Of a drawn film: approach and parting of a collision that is none cancel, but for 3 nm/s.
+    terms = ContactTerms.of(collisions(3, 100, 0.75, 0.2))
+    slow = terms.collision_impacts[:2].copy()
+    slow[:, LOSS_COLUMNS] = 3e-9
+    with_slow = replace(terms, collision_impacts=np.concatenate([terms.collision_impacts, slow]))
+    exponents = terms.bead_exponent(), with_slow.bead_exponent()
+    assert exponents[1].exponent.mean == pytest.approx(exponents[0].exponent.mean, abs=1e-3)
+    assert exponents[1].speed == pytest.approx(exponents[0].speed)
+    bins = with_slow.bead_bins(ENDS)
+    assert all(math.isfinite(part.restitution.value) for part in bins)
 
 
 def test_the_restitution_is_that_at_the_reference_speed():
