@@ -29,8 +29,6 @@ _FREEDOM, _TURNS = 4.0, 12
 _MEDIAN_ABSOLUTE = 0.6745
 # Fewer rebounds say nothing; nor do those that leave this part of the prior of a delay and more.
 _FEWEST, _UNTOLD = 5, 0.5
-# Delays differ where one changes by this part of its error, or the error by this factor.
-_CHANGE, _SURER = 0.5, 0.7
 _NONE = Measured(0.0, 0.0)
 # Walls, and how differently they may throw beads back where they need not be alike.
 _WALLS, _SPREAD_OF_WALLS = 4, 0.1
@@ -67,18 +65,6 @@ class RollingShutter:
             rebound,
             incoming=Measured(before * incoming.value, before * incoming.error),
             outgoing=Measured(after * outgoing.value, math.hypot(after * outgoing.error, unknown)),
-        )
-
-    def differs(self, other: RollingShutter) -> bool:
-        """Whether rebounds are to be read again where this is known in place of another."""
-        return any(
-            abs(own.value - before.value) > _CHANGE * before.error
-            or own.error < _SURER * before.error
-            or own.error > before.error / _SURER
-            for own, before in (
-                (self.along_columns, other.along_columns),
-                (self.along_rows, other.along_rows),
-            )
         )
 
 

@@ -159,8 +159,6 @@ class CycleContacts:
         self,
         drag: float,
         shutter_of: Callable[[Sequence[Rebound]], RollingShutter],
-        *,
-        final: bool,
     ) -> ContactTerms:
         """Likelihoods of the contacts.
 
@@ -170,8 +168,6 @@ class CycleContacts:
             Of the gas, for which speeds are about right.
         shutter_of : callable
             From rebounds to what they tell of the readout of the camera.
-        final : bool
-            Whether all rebounds are read with what they tell now, not with about that.
         """
         bodies_count = self._free_rebounds() < _ENOUGH_FREE
         if abs(drag - self._drag) > _DRAG_STEP:
@@ -194,19 +190,20 @@ class CycleContacts:
                 self._bounces = tables if self._bounces is None else self._bounces + tables
             self._counted += self._new
             self._new = []
-        terms = self._terms + self._terms_of_rebounds(shutter_of, final=final)
+        terms = self._terms + self._terms_of_rebounds(shutter_of)
         if self._sticking is None or self._bounces is None:
             return terms
         return replace(terms, beads=self._bounces.bead_table(self._sticking))
 
     def _terms_of_rebounds(
-        self, shutter_of: Callable[[Sequence[Rebound]], RollingShutter], *, final: bool
+        self, shutter_of: Callable[[Sequence[Rebound]], RollingShutter]
     ) -> ContactTerms:
         """Likelihoods of the rebounds; all are read again where the readout is another."""
         read = self._rebound_terms.rebounds
-        if read < len(self._rebounds) or final:
+        if read < len(self._rebounds):
             shutter = shutter_of(self._rebounds)
-            if shutter != self._shutter and (final or shutter.differs(self._shutter)):
+            # Not only where it differs much: what is told would depend on when it was asked.
+            if shutter != self._shutter:
                 read, self._rebound_terms = 0, ContactTerms.of(())
                 self._shutter = shutter
             self._rebound_terms += ContactTerms.of(

@@ -121,7 +121,7 @@ class DecayLibraryMethod:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         flights = contacts.flights
         losses = flight_losses(flights, self._drag_prior)
-        terms = contacts.terms(losses.slowing.drag.value, self._shutter_of, final=final)
+        terms = contacts.terms(losses.slowing.drag.value, self._shutter_of)
         friction = friction_weights(self._prior, terms)
         highest = math.inf if final else friction.highest if friction else 0.0
         likelihood = self._likelihood(decay, losses, highest)

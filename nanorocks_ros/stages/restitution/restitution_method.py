@@ -63,8 +63,6 @@ class Contacts(Protocol):
         self,
         drag: float,
         shutter_of: Callable[[Sequence[Rebound]], RollingShutter],
-        *,
-        final: bool,
     ) -> ContactTerms:
         """Likelihoods of the contacts, parameters as of `CycleContacts.terms`."""
 

@@ -154,13 +154,3 @@ def test_rebounds_that_are_all_alike_tell_nothing_of_a_law(walls_alike):
     shutter = rolling_shutter(rebounds, SIDES, PRIOR, walls_alike=walls_alike)
     for delay in (shutter.along_columns, shutter.along_rows):
         assert delay.value == pytest.approx(0.0, abs=1e-6)
-
-
-def test_what_is_known_better_is_told_from_what_is_known_as_well():
-    delays = 0.0, READOUT / SIDES[1]
-    few, more, all_of_them = (
-        rolling_shutter(list(seen(6, count, delays)), SIDES, PRIOR) for count in (20, 22, 120)
-    )
-    assert all_of_them.differs(few)
-    assert not more.differs(few)
-    assert few.differs(NO_SHUTTER)
