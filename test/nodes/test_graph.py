@@ -41,7 +41,8 @@ def test_a_bag_through_separate_nodes_gives_the_same_numbers_as_offline(graph):
         assert 'Traceback' not in ended.output
     # The fitter gets speeds rounded to float32, which the fit amplifies; an end of the interval of
     # 68 % of an exponent may lie near 0.
-    assert_same_numbers(arrays, rounding=5e-5, missed=0)
+    # The readout that few rebounds tell doubles what rounding changes while a cycle is young.
+    assert_same_numbers(arrays, rounding=1e-4, missed=0)
 
 
 def test_the_simulator_drives_the_graph_and_tells_the_truth(graph):
