@@ -71,7 +71,6 @@ ALL = (
     'decay_libraries',
     'friction_films',
     'drawn_friction',
-    'drag',
     'speed_dependence',
     'speed_headlines',
     'drawn_exponents',

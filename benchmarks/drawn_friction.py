@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.contacts import METRE_PX, contacts_of, true_tracks
 from benchmarks.coverage import coverage
+from benchmarks.cycle_estimates import estimate_of_tracks
 from benchmarks.drawn_films import drawn_gas
 from benchmarks.friction_films import ROWS
 from nanorocks_ros.cli.progress_bar import Progress
@@ -25,22 +26,16 @@ from nanorocks_ros.inference.contacts.contact_likelihood import marginal
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
 from nanorocks_ros.inference.contacts.rubbed_rebounds import ROLLING, rubbed_table
-from nanorocks_ros.inference.decay.decay_library_file import library_of
-from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
-from nanorocks_ros.inference.decay.decay_tables import tables_of
-from nanorocks_ros.inference.decay.friction_weights import friction_weights
-from nanorocks_ros.inference.flights.flight_losses import flight_losses, flight_table
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
-from nanorocks_ros.inference.restitution_sources import restitution_sources
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
-from nanorocks_ros.records import NS, FreeFlight, Headline, Interval, Measured
+from nanorocks_ros.records import NS, Headline, Interval, PairCollision, Rebound
 from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    pass
 
-_CYCLES = {1: 80, 3: 24}
-_SECONDS, _FIRST, _EVERY, _ERROR = 25.0, 1.75, 0.1, 0.02
+_CYCLES = {1: 80, 3: 40}
+_SECONDS, _FIRST = 25.0, 1.75
 _RATES, _JITTERS = (15.0, 24.0, 30.0, 60.0), (0.05, 0.1, 0.2)
 _ENDS = np.array([0.025, 0.5, 0.975])
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -58,6 +53,8 @@ class DrawnCycle:
     ----------
     beads, walls : Interval
         Headlines less the truth.
+    drag : float, [1/s]
+        What is found, less the truth.
     from_contacts : bool
     pulls : tuple of float
         Error of the walls over the stated one for each of `SHARES`, with friction and drag known.
@@ -67,6 +64,7 @@ class DrawnCycle:
 
     beads: Interval
     walls: Interval
+    drag: float
     from_contacts: bool
     pulls: tuple[float, ...]
     known: float
@@ -86,12 +84,17 @@ def report() -> None:
         )
     by_case = {case: [cycles[str(task)] for task in same] for case, same in cases.items()}
     print(
-        '\n| tray | drag [1/s] | friction | cycles | from contacts | beads: holds | half-width | '
-        'median error | walls: holds | half-width | median error |\n' + '| --- ' * 11 + '|'
+        '\n| tray | drag [1/s] | friction | cycles | drag found - true, sd of a cycle | from '
+        'contacts | beads: holds | half-width | median error | walls: holds | half-width | median '
+        'error |\n' + '| --- ' * 12 + '|'
     )
     for (number, drag, friction), read in by_case.items():
         share = np.mean([cycle.from_contacts for cycle in read])
-        cells = [f'{number} | {drag:g} | {friction:g} | {len(read)} | {share:.2f}']
+        off = np.array([cycle.drag for cycle in read])
+        cells = [
+            f'{number} | {drag:g} | {friction:g} | {len(read)} | '
+            f'{np.nanmean(off):+.4f}, {np.nanstd(off):.4f} | {share:.2f}'
+        ]
         for name in ('beads', 'walls'):
             seen = coverage([getattr(cycle, name) for cycle in read], 0.0)
             cells.append(f'{seen.holds:.2f} | {seen.half_width:.4f} | {seen.median_error:+.4f}')
@@ -131,39 +134,20 @@ def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCyc
     rate, jitter = _RATES[run % len(_RATES)], _JITTERS[run % len(_JITTERS)] / METRE_PX
     values |= {'first_shake': 0.0, 'seed': 9000 + run, 'frame_rate': rate}
     settings = with_values(SimulationSettings(), values, 'benchmark')
-    times: list[float] = []
-    speeds: list[float] = []
-
-    def watched() -> Iterator:
-        for tracks in true_tracks(tray, settings, 0, round(_SECONDS * rate), jitter):
-            times.append(tracks.stamp_ns / NS)
-            speeds.append(float(np.hypot(*tracks.velocities.T).mean()))
-            yield tracks
-
     nominal = load_trays()[number]
-    contacts = contacts_of(nominal, watched())
-    time = np.array(times)
-    used = np.flatnonzero(time >= _FIRST)[:: max(round(_EVERY * rate), 1)]
-    noise = np.random.default_rng([run, 5]).standard_normal(used.size)
-    speed = np.array(speeds)[used] * np.exp(_ERROR * noise)
-    cooling = [contact for contact in contacts if contact.stamp_ns >= _FIRST * NS]
-    flights = flight_table(contact for contact in cooling if isinstance(contact, FreeFlight))
-    losses = flight_losses(flights, Measured(_PRIOR.drag, _PRIOR.drag_error))
+    tracks = list(true_tracks(tray, settings, 0, round(_SECONDS * rate), jitter))
+    contacts = contacts_of(nominal, iter(tracks))
+    estimate = estimate_of_tracks(nominal, tracks, contacts, [run, 5])
     terms = ContactTerms.of(
-        dragged(contact, losses.slowing.drag.value)
-        for contact in cooling
-        if not isinstance(contact, FreeFlight)
+        dragged(contact, drag)
+        for contact in contacts
+        if isinstance(contact, Rebound | PairCollision) and contact.stamp_ns >= _FIRST * NS
     )
-    library = library_of(nominal)
-    tables = tables_of(library, nominal, _PRIOR)
-    camera = math.hypot(_PRIOR.scale_error, library.misfit), _PRIOR.speed_bias
-    decay = decay_likelihood(tables, time[used], speed, _ERROR * speed, camera, losses.drag)
-    integrated = decay.integrated(friction_weights(_PRIOR, terms))
-    sources = restitution_sources(tables, integrated, terms, _PRIOR, losses=losses)
     errors = [
         Interval(*(limit - float(values[name]) for limit in (own.value, own.lower, own.upper)))
-        for own, name in zip(
-            sources.intervals(_ENDS), ('restitution', 'wall_restitution'), strict=True
+        for own, name in (
+            (estimate.restitution, 'restitution'),
+            (estimate.wall_restitution, 'wall_restitution'),
         )
     ]
     truth = float(values['wall_restitution'])
@@ -173,7 +157,8 @@ def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCyc
     return DrawnCycle(
         beads=errors[0],
         walls=errors[1],
-        from_contacts=sources.headline is Headline.CONTACTS,
+        drag=estimate.drag.value - drag,
+        from_contacts=estimate.headline is Headline.CONTACTS,
         pulls=tuple((walls.mean - truth) / walls.deviation for walls in shared)
         or (math.nan,) * len(SHARES),
         known=0.5 * float(np.ptp(rolling.quantiles(_ENDS))) if rolling else math.nan,

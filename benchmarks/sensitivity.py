@@ -5,6 +5,7 @@ True tracks with the errors of tracking (`benchmarks.contacts`) and mean speeds 
 one thing at a time. A shift is that of the headline against the ideal cycles of the same seeds;
 the ideal row itself has errors against the truth. ``NANOROCKS_DEVIATION`` selects the rows whose
 names contain it, beside the ideal ones.
+
 Tested by ``test/validation/test_sensitivity.py``.
 """
 
@@ -13,7 +14,8 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from itertools import islice
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -21,11 +23,14 @@ from benchmarks import rough_gas as gas
 from benchmarks.accelerated_tray import AcceleratedTray
 from benchmarks.contacts import contacts_of, tracks_of
 from benchmarks.coverage import coverage
-from benchmarks.drag import FRAMES, estimate_of_tracks
+from benchmarks.cycle_estimates import estimate_of_tracks
+from benchmarks.late_stamps import LateTray
 from benchmarks.rolling_shutter import RolledTray
+from nanorocks_ros.cli.progress_bar import Progress
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.records import Headline, PairCollision, Quality
-from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.settings import PipelineSettings, PriorSettings
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
 from nanorocks_ros.stages.scale.scale_check import ScaleCheck
 
@@ -39,10 +44,14 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import CorEstimate, Measured, Tracks
     from nanorocks_ros.simulation.shaken_tray import Moment
 
+    _Beads: TypeAlias = ShakenTray | AcceleratedTray | RolledTray | LateTray
+
 _TRAYS = (1, 3)
 _CYCLES = 20
 _SEED = 2028
+_FRAMES = 600
 _TRUTH = {'restitution': gas.PAIRS, 'wall_restitution': gas.WALLS}
+_ALL_CORES = Workers()
 # Standard errors by which a measured drag or friction is noticed.
 _NOTICED = 3.0
 
@@ -77,6 +86,10 @@ class Deviation:
         middle along its length.
     readout : float, [s]
         From the first row of the tray that the camera reads to the last.
+    late : float, [s]
+        Standard deviation of the time between a picture and its stamp.
+    prior : dict
+        Settings of the prior that are told.
     """
 
     name: str
@@ -92,6 +105,8 @@ class Deviation:
     camera_height: float = math.inf
     aside: float = 0.0
     readout: float = 0.0
+    late: float = 0.0
+    prior: dict[str, float] = field(default_factory=dict)
 
 
 def _rubbing(friction: float) -> dict[str, float]:
@@ -124,6 +139,8 @@ DEVIATIONS = (
     Deviation(name='camera at 0.2 m, 40 mm aside', camera_height=0.2, aside=0.04),
     Deviation(name='camera at 0.12 m, 40 mm aside', camera_height=0.12, aside=0.04),
     Deviation(name='rows of the tray read within 30 ms', readout=0.03),
+    Deviation(name='the same, not looked for', readout=0.03, prior={'readout': 0.0}),
+    Deviation(name='time stamps off by 3 ms', late=3e-3),
 )
 
 
@@ -157,14 +174,14 @@ class SeenTray:
 
     Parameters
     ----------
-    beads : ShakenTray, AcceleratedTray or RolledTray
+    beads : ShakenTray, AcceleratedTray, RolledTray or LateTray
     tray : Tray
     deviation : Deviation
     """
 
     def __init__(
         self,
-        beads: ShakenTray | AcceleratedTray | RolledTray,
+        beads: _Beads,
         tray: Tray,
         deviation: Deviation,
     ) -> None:
@@ -212,17 +229,19 @@ def tracks_of_cycle(told: Tray, deviation: Deviation, run: int) -> list[Tracks]:
     """Tracks of a cycle by a tracker that never loses a bead, but those that are not tracked."""
     tray = true_tray(told, deviation)
     settings = _settings(told, deviation)
-    beads: ShakenTray | AcceleratedTray | RolledTray
+    beads: _Beads
     if any(deviation.acceleration):
         beads = AcceleratedTray(settings, tray, run, deviation.acceleration)
-    elif deviation.readout:
-        shaken = ShakenTray(settings, tray, run)
-        beads = RolledTray(shaken, tray, deviation.readout, settings.frame_rate)
     else:
-        beads = ShakenTray(settings, tray, run)
+        beads = shaken = ShakenTray(settings, tray, run)
+        if deviation.readout:
+            beads = RolledTray(shaken, tray, deviation.readout, settings.frame_rate)
+        elif deviation.late:
+            own = np.random.default_rng([_SEED, run, 3])
+            beads = LateTray(shaken, deviation.late, settings.frame_rate, own)
     rng = np.random.default_rng([_SEED, run])
     seen = SeenTray(beads, tray, deviation)
-    return [_as_told(tracks, told) for tracks in tracks_of(seen, tray, rng, FRAMES)]
+    return [_as_told(tracks, told) for tracks in tracks_of(seen, tray, rng, _FRAMES)]
 
 
 def _settings(told: Tray, deviation: Deviation):
@@ -247,7 +266,8 @@ def cycle_of(told: Tray, deviation: Deviation, run: int) -> tuple[CorEstimate, Q
     """The final estimate of a cycle, and what the check of the image scale says of it."""
     tracks = tracks_of_cycle(told, deviation, run)
     contacts = contacts_of(told, iter(tracks))
-    estimate = estimate_of_tracks(told, _settings(told, deviation), run, tracks, contacts)
+    prior = replace(PriorSettings(), **deviation.prior)
+    estimate = estimate_of_tracks(told, tracks, contacts, [_SEED, run, 2], prior)
     return estimate, _scale_flag(told, tracks, contacts)
 
 
@@ -262,42 +282,51 @@ def _scale_flag(told: Tray, tracks: list[Tracks], contacts: Contacts) -> Quality
     return check.flag
 
 
-def report(cycles: int = _CYCLES) -> None:
+def _cycle_of(task: tuple[int, Deviation, int]) -> tuple[CorEstimate, Quality]:
+    number, deviation, run = task
+    return cycle_of(load_trays()[number], deviation, run)
+
+
+def report(cycles: int = _CYCLES, workers: Workers = _ALL_CORES) -> None:
     """Print the table.
 
     Parameters
     ----------
     cycles : int
         In each row.
+    workers : Workers, optional
     """
+    selected = os.environ.get('NANOROCKS_DEVIATION', '')
+    rows = [row for row in DEVIATIONS if row == IDEAL or selected in row.name]
+    cases = [(number, row) for number in _TRAYS for row in rows]
+    tasks = {
+        f'{number}, {row.name}, {run}': (number, row, run)
+        for number, row in cases
+        for run in range(cycles)
+    }
+    with Progress('true tracks') as progress:
+        every = iter(run_tasks(_cycle_of, tasks, workers, progress.count))
     print(
         '\n| tray | not as told | beads: shift | 95 % holds | half-width | walls: shift | 95 % '
         'holds | half-width | collisions | contacts alone | inconsistent | accelerated | drag | '
         'friction | scale |\n' + '| --- ' * 15 + '|'
     )
-    selected = os.environ.get('NANOROCKS_DEVIATION', '')
-    for number in _TRAYS:
-        told = load_trays()[number]
-        # The ideal row has errors: what it is compared with is the truth.
-        unshifted = [_TRUTH] * cycles
-        for deviation in DEVIATIONS:
-            if deviation != IDEAL and selected not in deviation.name:
-                continue
-            estimates, flags = zip(
-                *(cycle_of(told, deviation, run) for run in range(cycles)), strict=True
-            )
-            collisions = np.mean([estimate.collisions for estimate in estimates])
-            cells = [
-                *_shifts(estimates, unshifted),
-                f'{collisions:.0f}',
-                *_noticed(estimates, flags),
+    for number, deviation in cases:
+        estimates, flags = zip(*islice(every, cycles), strict=True)
+        if deviation == IDEAL:
+            # The ideal row has errors: what it is compared with is the truth.
+            unshifted = [_TRUTH] * cycles
+        collisions = np.mean([estimate.collisions for estimate in estimates])
+        cells = [
+            *_shifts(estimates, unshifted),
+            f'{collisions:.0f}',
+            *_noticed(estimates, flags),
+        ]
+        print(f'| {number} | {deviation.name} | {" | ".join(cells)} |')
+        if deviation == IDEAL:
+            unshifted = [
+                {name: getattr(estimate, name).value for name in _TRUTH} for estimate in estimates
             ]
-            print(f'| {number} | {deviation.name} | {" | ".join(cells)} |', flush=True)
-            if deviation == IDEAL:
-                unshifted = [
-                    {name: getattr(estimate, name).value for name in _TRUTH}
-                    for estimate in estimates
-                ]
 
 
 def _shifts(

@@ -18,6 +18,7 @@ from benchmarks.sensitivity import (
     true_tray,
 )
 from nanorocks_ros.experiment.trays import load_trays
+from nanorocks_ros.jobs.tasks import Workers
 from nanorocks_ros.records import Headline, PairCollision, Quality
 from nanorocks_ros.settings import SimulationSettings, with_values
 from nanorocks_ros.simulation.shaken_tray import ShakenTray
@@ -139,7 +140,7 @@ def test_the_same_cycles_are_not_shifted_and_those_with_drag_are_noticed(capsys,
     )
     monkeypatch.setattr(sensitivity, '_TRAYS', (1,))
     monkeypatch.setattr(sensitivity, 'DEVIATIONS', rows)
-    sensitivity.report(cycles=2)
+    sensitivity.report(cycles=2, workers=Workers(processes=1))
     header, _, ideal, same, dragged = (
         [cell.strip() for cell in line.strip('|').split('|')]
         for line in capsys.readouterr().out.splitlines()

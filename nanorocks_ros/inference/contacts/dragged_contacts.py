@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 _LEAST_ERROR = 0.01
 # A hit of floor or lid that shows ends a flight, so that beside a contact less is lost than by the
 # friction rate: what made the restitution of the beads right over that, and its relative spread,
-# in trays 1 and 3, frictions of 0.01 to 0.1, drags of 0 and 0.02 /s (`benchmarks.friction`,
-# `benchmarks.drag`).
+# in trays 1 and 3, frictions of 0.01 to 0.1, drags of 0 and 0.02 /s (`benchmarks.drawn_friction`
+# tells whether it holds).
 FRICTION_FACTOR, FRICTION_SPREAD = 0.7, 0.6
 
 
