@@ -31,7 +31,7 @@ from nanorocks_ros.inference.likelihood_1d import Likelihood1D
 from nanorocks_ros.records import UNKNOWN_MEASURED, Measured, PairCollision, Rebound
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -118,6 +118,19 @@ class ContactTerms:
             collision_losses=self.collision_losses + other.collision_losses,
             rebound_impacts=np.concatenate([self.rebound_impacts, other.rebound_impacts]),
             collision_impacts=np.concatenate([self.collision_impacts, other.collision_impacts]),
+        )
+
+    def read_again(self, rebounds: Sequence[Rebound]) -> ContactTerms:
+        """The same contacts with other speeds of the rebounds, as read with another readout.
+
+        What they tell of friction stays: it goes by the sum of both speeds, and a readout takes
+        from one what it adds to the other.
+        """
+        return replace(
+            self,
+            walls=rebound_table(rebounds, _WALLS),
+            rebound_losses=loss_sums(rebounds),
+            rebound_impacts=rebound_impacts(rebounds),
         )
 
     @property

@@ -126,9 +126,8 @@ class CycleContacts:
     def _start_sums(self) -> None:
         """Sum all contacts anew."""
         self._counted, self._new = [], self._counted + self._new
-        self._terms = self._rebound_terms = ContactTerms.of(())
+        self._terms = ContactTerms.of(())
         self._rebounds: list[Rebound] = []
-        self._shutter = NO_SHUTTER
         self._bounces = None
 
     def next_cycle(self) -> None:
@@ -182,34 +181,22 @@ class CycleContacts:
                 for contact in self._new
                 if bodies_count or not _is_of_body(contact)
             ]
-            collisions = [each for each in dragged_contacts if isinstance(each, PairCollision)]
-            self._terms += ContactTerms.of(collisions, self._sticking_speed)
+            self._terms += ContactTerms.of(dragged_contacts, self._sticking_speed)
             self._rebounds += [each for each in dragged_contacts if isinstance(each, Rebound)]
             if self._sticking is not None:
+                collisions = [each for each in dragged_contacts if isinstance(each, PairCollision)]
                 tables = BounceTables.of(collisions)
                 self._bounces = tables if self._bounces is None else self._bounces + tables
             self._counted += self._new
             self._new = []
-        terms = self._terms + self._terms_of_rebounds(shutter_of)
+        # Each time from all of them: what is told does not depend on when it was asked before.
+        shutter = shutter_of(self._rebounds)
+        terms = self._terms
+        if shutter != NO_SHUTTER:
+            terms = terms.read_again([shutter.read_at_once(each) for each in self._rebounds])
         if self._sticking is None or self._bounces is None:
             return terms
         return replace(terms, beads=self._bounces.bead_table(self._sticking))
-
-    def _terms_of_rebounds(
-        self, shutter_of: Callable[[Sequence[Rebound]], RollingShutter]
-    ) -> ContactTerms:
-        """Likelihoods of the rebounds; all are read again where the readout is another."""
-        read = self._rebound_terms.rebounds
-        if read < len(self._rebounds):
-            shutter = shutter_of(self._rebounds)
-            # Not only where it differs much: what is told would depend on when it was asked.
-            if shutter != self._shutter:
-                read, self._rebound_terms = 0, ContactTerms.of(())
-                self._shutter = shutter
-            self._rebound_terms += ContactTerms.of(
-                [self._shutter.read_at_once(rebound) for rebound in self._rebounds[read:]]
-            )
-        return self._rebound_terms
 
     def restart(self, stamp_ns: int) -> None:
         """Handle time that went back to a stamp: drop the sums and all later contacts."""
