@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from nanorocks_ros.inference.contacts.dragged_contacts import (
     loss_beside_contacts,
     loss_sums,
 )
-from nanorocks_ros.inference.contacts.rolling_shutter import rolling_shutter
+from nanorocks_ros.inference.contacts.rebound_reading import AS_SEEN, rebound_reading
 from nanorocks_ros.inference.flights.flight_losses import (
     MIN_FLIGHTS,
     Slowing,
@@ -121,8 +122,7 @@ def contacts_alone(
     probability : float
         Of the intervals.
     sides : tuple of 2 floats or None, [m]
-        Of the tray: rebounds from opposite walls tell how its rows are read one after the other
-        (`rolling_shutter`). None: at once.
+        Of the tray: rebounds tell how it is read (`rebound_reading`). None: they count as seen.
     height_known : bool
         Whether the height of the tray is; where walls rub floor and lid then do as well.
     each_wall : bool
@@ -134,25 +134,31 @@ def contacts_alone(
     slowing = losses.slowing if is_measured else Slowing.by_drag(Measured(prior.drag, 0.0))
     own = [_complete(dragged(contact, slowing.drag.value)) for contact in contacts]
     rebounds = [contact for contact in own if isinstance(contact, Rebound)]
+    reading = AS_SEEN
     if sides is not None:
-        shutter = rolling_shutter(rebounds, sides, prior.readout, walls_alike=False)
-        rebounds = [shutter.read_at_once(rebound) for rebound in rebounds]
+        reading = rebound_reading(rebounds, sides, prior.readout, walls_alike=False)
+        rebounds = [reading.read(rebound) for rebound in rebounds]
+    bias = math.hypot(prior.rebound_bias, reading.error)
     collisions = [
         contact
         for contact in own
         if isinstance(contact, PairCollision) and np.isfinite(contact.temperatures).all()
     ]
+
+    def terms_of(some: Sequence[Rebound]) -> ContactTerms:
+        return replace(ContactTerms.of(some), reading_error=reading.error)
+
     numbers = sorted({rebound.wall for rebound in rebounds}) if each_wall else []
     # Floor and lid rub as the walls do, which all rebounds tell together.
-    friction = ContactTerms.of(rebounds) if height_known and is_measured else None
+    friction = terms_of(rebounds) if height_known and is_measured else None
 
     def walls(some: Sequence[Rebound]) -> RestitutionOfContacts:
         speeds = [rebound.incoming.value for rebound in some]
         table = rebound_table(some, _GRID)
-        smooth = _restitution(table, some, speeds, (slowing, prior.rebound_bias, probability))
+        smooth = _restitution(table, some, speeds, (slowing, bias, probability))
         if friction is None or not smooth.restitution.lower > _LOWEST_RUBBED:
             return smooth
-        own = friction if len(some) == len(rebounds) else ContactTerms.of(some)
+        own = friction if len(some) == len(rebounds) else terms_of(some)
         likelihood = walls_of_rolling(own, prior, losses, friction)
         if walls_rub(friction.wall_friction):
             likelihood = walls_of_either(own, prior, losses, likelihood, friction)

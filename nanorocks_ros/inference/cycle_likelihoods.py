@@ -135,6 +135,7 @@ class CycleLikelihoods:
                 collision_losses=arrays['contacts.collision_losses'],
                 rebound_impacts=arrays['contacts.rebound_impacts'],
                 collision_impacts=arrays['contacts.collision_impacts'],
+                reading_error=float(arrays['contacts.reading_error']),
             )
             return cls(
                 cycles=cycles,

@@ -68,6 +68,9 @@ class ContactTerms:
         Sums of `loss_sums`.
     rebound_impacts, collision_impacts : ndarray (n, columns)
         Rows of `rebound_impacts` and `collision_impacts`.
+    reading_error : float
+        Standard deviation of the wall restitution that all rebounds of a cycle have in common, by
+        how they are read.
     """
 
     rebounds: int
@@ -79,6 +82,7 @@ class ContactTerms:
     collision_losses: NDArray[np.float64]
     rebound_impacts: NDArray[np.float64]
     collision_impacts: NDArray[np.float32]
+    reading_error: float = 0.0
 
     @classmethod
     def of(
@@ -118,12 +122,16 @@ class ContactTerms:
             collision_losses=self.collision_losses + other.collision_losses,
             rebound_impacts=np.concatenate([self.rebound_impacts, other.rebound_impacts]),
             collision_impacts=np.concatenate([self.collision_impacts, other.collision_impacts]),
+            reading_error=math.hypot(
+                self.rebounds * self.reading_error, other.rebounds * other.reading_error
+            )
+            / max(self.rebounds + other.rebounds, 1),
         )
 
-    def read_again(self, rebounds: Sequence[Rebound]) -> ContactTerms:
-        """The same contacts with other speeds of the rebounds, as read with another readout.
+    def read_again(self, rebounds: Sequence[Rebound], error: float) -> ContactTerms:
+        """The same contacts with other speeds of the rebounds, as `ReboundReading` reads them.
 
-        What they tell of friction stays: it goes by the sum of both speeds, and a readout takes
+        What they tell of friction stays: it goes by the sum of both speeds, and a reading takes
         from one what it adds to the other.
         """
         return replace(
@@ -131,6 +139,7 @@ class ContactTerms:
             walls=rebound_table(rebounds, _WALLS),
             rebound_losses=loss_sums(rebounds),
             rebound_impacts=rebound_impacts(rebounds),
+            reading_error=error,
         )
 
     @property
@@ -158,6 +167,7 @@ class ContactTerms:
         if not self.rebounds:
             return None
         term = Likelihood1D(restitution=_WALLS, log_likelihood=marginal(self.walls))
+        bias = math.hypot(bias, self.reading_error)
         return _slowed(term, loss_beside_contacts(self.rebound_losses, slowing), bias)
 
     def rubbed_wall_likelihood(
@@ -182,7 +192,8 @@ class ContactTerms:
         """
         if not self.rebounds:
             return None
-        return rubbed_likelihood(self.rebound_impacts, slowing, friction, share).convolved(bias)
+        likelihood = rubbed_likelihood(self.rebound_impacts, slowing, friction, share)
+        return likelihood.convolved(math.hypot(bias, self.reading_error))
 
     def bead_likelihood(
         self, bias: float = 0.0, slowing: Slowing = NO_SLOWING

@@ -13,7 +13,7 @@ import numpy as np
 
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
-from nanorocks_ros.inference.contacts.rolling_shutter import NO_SHUTTER
+from nanorocks_ros.inference.contacts.rebound_reading import AS_SEEN
 from nanorocks_ros.inference.flights.flight_losses import flight_table
 from nanorocks_ros.inference.sticking.bounce_tables import SPEEDS, BounceTables
 from nanorocks_ros.records import FreeFlight, PairCollision, Rebound
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from nanorocks_ros.inference.contacts.rolling_shutter import RollingShutter
+    from nanorocks_ros.inference.contacts.rebound_reading import ReboundReading
     from nanorocks_ros.records import Contact, ContactOrFlight, Merge
     from nanorocks_ros.settings import CoolingSettings
 
@@ -157,7 +157,7 @@ class CycleContacts:
     def terms(
         self,
         drag: float,
-        shutter_of: Callable[[Sequence[Rebound]], RollingShutter],
+        reading_of: Callable[[Sequence[Rebound]], ReboundReading],
     ) -> ContactTerms:
         """Likelihoods of the contacts.
 
@@ -165,7 +165,7 @@ class CycleContacts:
         ----------
         drag : float, [1/s]
             Of the gas, for which speeds are about right.
-        shutter_of : callable
+        reading_of : callable
             From rebounds to what they tell of the readout of the camera.
         """
         bodies_count = self._free_rebounds() < _ENOUGH_FREE
@@ -190,10 +190,11 @@ class CycleContacts:
             self._counted += self._new
             self._new = []
         # Each time from all of them: what is told does not depend on when it was asked before.
-        shutter = shutter_of(self._rebounds)
+        reading = reading_of(self._rebounds)
         terms = self._terms
-        if shutter != NO_SHUTTER:
-            terms = terms.read_again([shutter.read_at_once(each) for each in self._rebounds])
+        if reading != AS_SEEN:
+            again = [reading.read(each) for each in self._rebounds]
+            terms = terms.read_again(again, reading.error)
         if self._sticking is None or self._bounces is None:
             return terms
         return replace(terms, beads=self._bounces.bead_table(self._sticking))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nanorocks_ros.inference.contacts.rebound_reading import SWING_ERROR
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.median import median_of
 from nanorocks_ros.stages.contacts.oscillation_fit import (
@@ -34,10 +35,8 @@ _FOURTH_DIFFERENCE_VARIANCE = 70.0
 # the noise between frames, since registration errors last for several frames.
 _MAX_RESIDUAL_SHARE = 0.02
 _MAX_RESIDUAL_NOISE = 3.0
-# Error of a velocity: factor over that of independent frames, and relative error, since small
-# displacements were registered up to a tenth too small or too large.
+# Error of a velocity over that of independent frames.
 _CORRELATION_FACTOR = 2.0
-_SCALE_ERROR = 0.08
 # Frames from one look at the swing of the tray to the next.
 _SWING_FRAMES = 10
 # Frames on each side over which the temperature is averaged.
@@ -175,7 +174,7 @@ class TrayHistory:
             error = _CORRELATION_FACTOR * max(fits.noise, fits.residual)
             error *= fits.oscillation.error_factor
             unseen = max(swing - fits.swing, 0.0)
-            return velocity, math.hypot(error, _SCALE_ERROR * math.hypot(*velocity), unseen)
+            return velocity, math.hypot(error, SWING_ERROR * math.hypot(*velocity), unseen)
         cubic = fit_slope(polynomial_terms(times[narrow], 3), displacements[narrow])
         return cubic.velocity, _CORRELATION_FACTOR * fits.noise * cubic.error_factor
 

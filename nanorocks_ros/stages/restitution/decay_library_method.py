@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.errors import FitError
-from nanorocks_ros.inference.contacts.rolling_shutter import rolling_shutter
+from nanorocks_ros.inference.contacts.rebound_reading import rebound_reading
 from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
@@ -95,8 +95,8 @@ class DecayLibraryMethod:
         }
         self._prior = prior
         self._drag_prior = Measured(prior.drag, prior.drag_error)
-        self._shutter_of = partial(
-            rolling_shutter, sides=tray.dimensions[:2], readout=prior.readout
+        self._reading_of = partial(
+            rebound_reading, sides=tray.dimensions[:2], readout=prior.readout
         )
         self._relative_drag = mean_relative_drag(tray)
         check_walls((prior.min_wall_restitution, prior.max_wall_restitution))
@@ -121,7 +121,7 @@ class DecayLibraryMethod:
             raise FitError('cooling', 'the speeds do not fall', 'give a window in which they do')
         flights = contacts.flights
         losses = flight_losses(flights, self._drag_prior)
-        terms = contacts.terms(losses.slowing.drag.value, self._shutter_of)
+        terms = contacts.terms(losses.slowing.drag.value, self._reading_of)
         friction = friction_weights(self._prior, terms)
         highest = math.inf if final else friction.highest if friction else 0.0
         likelihood = self._likelihood(decay, losses, highest)

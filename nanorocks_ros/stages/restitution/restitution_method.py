@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-    from nanorocks_ros.inference.contacts.rolling_shutter import RollingShutter
+    from nanorocks_ros.inference.contacts.rebound_reading import ReboundReading
     from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRestitution
     from nanorocks_ros.records import CorRelation, Rebound
     from nanorocks_ros.stages.restitution.cycle_restitution import CycleRestitution
@@ -62,7 +62,7 @@ class Contacts(Protocol):
     def terms(
         self,
         drag: float,
-        shutter_of: Callable[[Sequence[Rebound]], RollingShutter],
+        reading_of: Callable[[Sequence[Rebound]], ReboundReading],
     ) -> ContactTerms:
         """Likelihoods of the contacts, parameters as of `CycleContacts.terms`."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from contact_draws import drawn_collisions, drawn_rebounds
@@ -12,7 +14,7 @@ from nanorocks_ros.inference.contacts.contact_likelihood import (
     rebound_log_likelihood,
 )
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.contacts.rolling_shutter import RollingShutter
+from nanorocks_ros.inference.contacts.rebound_reading import ReboundReading
 from nanorocks_ros.records import Measured, PairCollision, Rebound
 
 FINE = np.linspace(0.5, 1.0, 1001)
@@ -56,13 +58,15 @@ def test_the_nodes_give_the_same_estimate_as_a_fine_grid():
 
 def test_rebounds_of_a_rolling_shutter_are_read_again_and_their_friction_stays():
     every = contacts()
-    shutter = RollingShutter(along_columns=Measured(0.5, 0.1), along_rows=Measured(-0.5, 0.1))
-    read = [shutter.read_at_once(each) if isinstance(each, Rebound) else each for each in every]
+    reading = ReboundReading(along_columns=Measured(0.5, 0.1), along_rows=Measured(-0.5, 0.1))
+    read = [reading.read(each) if isinstance(each, Rebound) else each for each in every]
     seen, at_once = ContactTerms.of(every), ContactTerms.of(read)
-    again = seen.read_again([each for each in read if isinstance(each, Rebound)])
+    again = seen.read_again([each for each in read if isinstance(each, Rebound)], 0.01)
     for name in ('walls', 'rebound_losses', 'rebound_impacts', 'beads', 'collision_losses'):
         np.testing.assert_array_equal(getattr(again, name), getattr(at_once, name))
     assert np.abs(again.walls - seen.walls).max() > 1.0
+    exact, wider = (terms.wall_likelihood().posterior((0.5, 1.0)) for terms in (at_once, again))
+    assert wider.deviation == pytest.approx(math.hypot(exact.deviation, 0.01), rel=0.05)
     # As exact as it would be from the speeds as they are read again.
     friction, exact = again.wall_friction, at_once.wall_friction
     assert friction.value == pytest.approx(exact.value, abs=0.02 * exact.error)

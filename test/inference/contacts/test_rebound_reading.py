@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from nanorocks_ros.inference.contacts.contact_likelihood import rebound_log_likelihood
-from nanorocks_ros.inference.contacts.rolling_shutter import NO_SHUTTER, rolling_shutter
+from nanorocks_ros.inference.contacts.rebound_reading import AS_SEEN, SWING_ERROR, rebound_reading
 from nanorocks_ros.records import Measured, Rebound
 
 SIDES = 0.03, 0.02
@@ -53,8 +54,8 @@ def likely(rebounds):
 def test_the_readout_is_found_along_either_side_in_either_direction(axis, sign):
     delays = [0.0, 0.0]
     delays[axis] = sign * READOUT / SIDES[axis]
-    shutter = rolling_shutter(list(seen(1, 80, delays)), SIDES, PRIOR)
-    found = shutter.along_columns, shutter.along_rows
+    reading = rebound_reading(list(seen(1, 80, delays)), SIDES, PRIOR)
+    found = reading.along_columns, reading.along_rows
     for delay, true in zip(found, delays, strict=True):
         assert abs(delay.value - true) < 3.0 * delay.error
         assert delay.error < 0.2 * READOUT / SIDES[axis]
@@ -64,8 +65,8 @@ def test_errors_of_the_readout_are_those_stated():
     pulls = []
     for seed in range(60):
         delays = np.random.default_rng([seed, 1]).normal(0.0, PRIOR / np.array(SIDES))
-        shutter = rolling_shutter(list(seen(seed, 40, delays)), SIDES, PRIOR)
-        pairs = zip((shutter.along_columns, shutter.along_rows), delays, strict=True)
+        reading = rebound_reading(list(seen(seed, 40, delays)), SIDES, PRIOR)
+        pairs = zip((reading.along_columns, reading.along_rows), delays, strict=True)
         pulls += [(delay.value - true) / delay.error for delay, true in pairs if delay.error]
     assert len(pulls) > 100
     assert 0.8 < np.std(pulls) < 1.2
@@ -77,10 +78,8 @@ def test_walls_are_read_as_by_a_camera_that_reads_all_at_once():
     delays = 0.0, READOUT / SIDES[1]
     rebounds = list(seen(2, 150, delays, walls=(2, 3, 3, 3)))
     assert abs(likely(rebounds) - WALLS) > 0.006
-    shutter = rolling_shutter(rebounds, SIDES, PRIOR)
-    assert likely([shutter.read_at_once(each) for each in rebounds]) == pytest.approx(
-        WALLS, abs=0.003
-    )
+    reading = rebound_reading(rebounds, SIDES, PRIOR)
+    assert likely([reading.read(each) for each in rebounds]) == pytest.approx(WALLS, abs=0.003)
 
 
 def test_a_restitution_that_depends_on_speed_is_no_readout():
@@ -91,9 +90,9 @@ def test_a_restitution_that_depends_on_speed_is_no_readout():
         )
         for each in seen(7, 150, (0.0, 0.0), walls=(0, 2, 3, 3, 3))
     ]
-    shutter = rolling_shutter(rebounds, SIDES, PRIOR)
-    assert 0.0 < shutter.along_rows.error < 0.1 / SIDES[1] * READOUT
-    for delay in (shutter.along_columns, shutter.along_rows):
+    reading = rebound_reading(rebounds, SIDES, PRIOR)
+    assert 0.0 < reading.along_rows.error < 0.1 / SIDES[1] * READOUT
+    for delay in (reading.along_columns, reading.along_rows):
         assert abs(delay.value) < 3.0 * delay.error
 
 
@@ -105,7 +104,7 @@ def test_walls_that_are_not_alike_are_no_readout_where_they_need_not_be():
         for each in seen(8, 150, (0.0, 0.0))
     ]
     alike, unlike = (
-        rolling_shutter(rebounds, SIDES, PRIOR, walls_alike=walls_alike).along_rows
+        rebound_reading(rebounds, SIDES, PRIOR, walls_alike=walls_alike).along_rows
         for walls_alike in (True, False)
     )
     assert alike.value > 5.0 * alike.error
@@ -115,15 +114,15 @@ def test_walls_that_are_not_alike_are_no_readout_where_they_need_not_be():
 
 def test_rebounds_from_one_wall_tell_nothing_and_stay_as_they_are():
     rebounds = list(seen(3, 40, (0.0, READOUT / SIDES[1]), walls=(3,)))
-    shutter = rolling_shutter(rebounds, SIDES, PRIOR)
-    assert shutter == NO_SHUTTER
-    assert shutter.read_at_once(rebounds[0]) is rebounds[0]
+    reading = rebound_reading(rebounds, SIDES, PRIOR)
+    assert reading == AS_SEEN
+    assert reading.read(rebounds[0]) is rebounds[0]
 
 
 @pytest.mark.parametrize(('count', 'readout'), [(4, PRIOR), (80, 0.0)])
-def test_few_rebounds_or_a_camera_known_to_read_at_once_change_nothing(count, readout):
+def test_few_rebounds_or_a_camera_known_to_read_change_nothing(count, readout):
     rebounds = list(seen(4, count, (0.0, READOUT / SIDES[1])))
-    assert rolling_shutter(rebounds, SIDES, readout) == NO_SHUTTER
+    assert rebound_reading(rebounds, SIDES, readout) == AS_SEEN
 
 
 def test_rebounds_of_bodies_and_strays_count_little():
@@ -134,10 +133,10 @@ def test_rebounds_of_bodies_and_strays_count_little():
     ]
     bodies = [replace(each, beads=3) for each in strays]
     without, others = (
-        rolling_shutter(rebounds, SIDES, PRIOR) for rebounds in (good, [*good, *bodies])
+        rebound_reading(rebounds, SIDES, PRIOR) for rebounds in (good, [*good, *bodies])
     )
     assert without == others
-    with_strays = rolling_shutter([*good, *strays], SIDES, PRIOR).along_rows
+    with_strays = rebound_reading([*good, *strays], SIDES, PRIOR).along_rows
     assert abs(with_strays.value - without.along_rows.value) < without.along_rows.error
 
 
@@ -151,6 +150,50 @@ def test_rebounds_that_are_all_alike_tell_nothing_of_a_law(walls_alike):
         wall_velocity=Measured(0.0, 0.0),
     )
     rebounds = [replace(exact, wall=wall) for wall in (0, 1, 2, 3) * 3]
-    shutter = rolling_shutter(rebounds, SIDES, PRIOR, walls_alike=walls_alike)
-    for delay in (shutter.along_columns, shutter.along_rows):
+    reading = rebound_reading(rebounds, SIDES, PRIOR, walls_alike=walls_alike)
+    for delay in (reading.along_columns, reading.along_rows):
         assert delay.value == pytest.approx(0.0, abs=1e-6)
+
+
+def swung(seed, count, share, noise=1e-5, swing=1e-3):
+    """Rebounds from walls that swing, of which this share of the true velocity is registered."""
+    random = np.random.default_rng([seed, 4])
+    for rebound in seen(seed, count, (0.0, 0.0)):
+        # Beads meet walls that come towards them more often.
+        true = random.normal(-swing, swing)
+        registered = share * true + random.normal(0.0, noise)
+        off = registered - true
+        yield replace(
+            rebound,
+            incoming=Measured(rebound.incoming.value - off, ERROR),
+            outgoing=Measured(rebound.outgoing.value + off, ERROR),
+            wall_velocity=Measured(registered, math.hypot(noise, SWING_ERROR * registered)),
+        )
+
+
+@pytest.mark.parametrize('share', [0.9, 1.08])
+def test_walls_that_move_faster_or_slower_than_they_are_registered_are_known_by_rebounds(share):
+    rebounds = list(swung(10, 60, share))
+    reading = rebound_reading(rebounds, SIDES, PRIOR)
+    assert reading.swing.value == pytest.approx(1.0 / share - 1.0, abs=3.0 * reading.swing.error)
+    assert reading.swing.error < 0.25 * SWING_ERROR
+    before, after = likely(rebounds), likely([reading.read(each) for each in rebounds])
+    assert abs(before - WALLS) > 0.01
+    assert after == pytest.approx(WALLS, abs=0.005)
+
+
+def test_errors_of_the_swing_are_those_stated():
+    pulls = []
+    for seed in range(60):
+        share = 1.0 / (1.0 + np.random.default_rng([seed, 6]).normal(0.0, SWING_ERROR))
+        swing = rebound_reading(list(swung(seed, 30, share)), SIDES, PRIOR).swing
+        pulls.append((swing.value - (1.0 / share - 1.0)) / swing.error)
+    assert 0.8 < np.std(pulls) < 1.2
+    assert abs(np.mean(pulls)) < 0.4
+
+
+def test_walls_that_rest_tell_no_swing_and_stay_as_they_are():
+    rebounds = list(swung(11, 60, 1.0, noise=1e-4, swing=1e-9))
+    reading = rebound_reading(rebounds, SIDES, 0.0)
+    assert reading.read(rebounds[0]) is rebounds[0]
+    assert reading.error < 5e-4
