@@ -69,8 +69,8 @@ class ContactTerms:
     rebound_impacts, collision_impacts : ndarray (n, columns)
         Rows of `rebound_impacts` and `collision_impacts`.
     reading_error : float
-        Standard deviation of the wall restitution that all rebounds of a cycle have in common, by
-        how they are read.
+        Standard deviation of the wall restitution that all rebounds have in common, by how they
+        are read.
     """
 
     rebounds: int
@@ -122,8 +122,9 @@ class ContactTerms:
             collision_losses=self.collision_losses + other.collision_losses,
             rebound_impacts=np.concatenate([self.rebound_impacts, other.rebound_impacts]),
             collision_impacts=np.concatenate([self.collision_impacts, other.collision_impacts]),
-            reading_error=math.hypot(
-                self.rebounds * self.reading_error, other.rebounds * other.reading_error
+            # A camera, or a codec, errs alike in all cycles.
+            reading_error=(
+                self.rebounds * self.reading_error + other.rebounds * other.reading_error
             )
             / max(self.rebounds + other.rebounds, 1),
         )

@@ -74,7 +74,6 @@ class ReboundReading:
         faster = self.swing.value * rebound.wall_velocity.value
         if faster:
             incoming, outgoing = rebound.incoming, rebound.outgoing
-            # Outwards.
             rebound = replace(
                 rebound,
                 incoming=Measured(incoming.value - faster, incoming.error),

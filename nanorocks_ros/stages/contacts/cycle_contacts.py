@@ -166,7 +166,7 @@ class CycleContacts:
         drag : float, [1/s]
             Of the gas, for which speeds are about right.
         reading_of : callable
-            From rebounds to what they tell of the readout of the camera.
+            From rebounds to what they tell of how they are read.
         """
         bodies_count = self._free_rebounds() < _ENOUGH_FREE
         if abs(drag - self._drag) > _DRAG_STEP:

@@ -67,6 +67,8 @@ def test_rebounds_of_a_rolling_shutter_are_read_again_and_their_friction_stays()
     assert np.abs(again.walls - seen.walls).max() > 1.0
     exact, wider = (terms.wall_likelihood().posterior((0.5, 1.0)) for terms in (at_once, again))
     assert wider.deviation == pytest.approx(math.hypot(exact.deviation, 0.01), rel=0.05)
+    assert (again + again).reading_error == pytest.approx(0.01)
+    assert (again + seen).reading_error == pytest.approx(0.005)
     # As exact as it would be from the speeds as they are read again.
     friction, exact = again.wall_friction, at_once.wall_friction
     assert friction.value == pytest.approx(exact.value, abs=0.02 * exact.error)
