@@ -3,9 +3,9 @@
 Films of trays and cameras that are drawn (`drawn_films`), each with and without drag and friction;
 ``NANOROCKS_FILM_COUNT`` is the number of films a row, 40 by default, and ``NANOROCKS_FIRST_FILM``
 the number of the first one, 0 by default. The intervals are those of all final headlines of beads,
-and of walls: how many hold the truth of all, and of those that no flag warns of; "unflagged" is the
-share of these. "Over ideal" is the median over films of the half-width over that of the same film
-without drag and friction.
+and of walls: how many hold the truth of all, and of those that no flag warns of; "unflagged" is
+the share of these. "Over ideal" is the median over films of the half-width over that of the same
+film without drag and friction.
 """
 
 from __future__ import annotations
