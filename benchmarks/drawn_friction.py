@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,9 +29,6 @@ from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.records import NS, Headline, Interval, PairCollision, Rebound
 from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
-
-if TYPE_CHECKING:
-    pass
 
 _CYCLES = {1: 80, 3: 40}
 _SECONDS, _FIRST = 25.0, 1.75
