@@ -81,7 +81,7 @@ def _run_in_pool(
     function: Callable[[Argument], Result], tasks: Mapping[str, Argument], processes: int
 ) -> Generator[tuple[str, Result], None, None]:
     broken = None
-    with _pool(processes) as pool:
+    with _pool(processes, function) as pool:
         with _worker_environment():
             keys = {pool.submit(_run_task, function, task): key for key, task in tasks.items()}
         for future in as_completed(keys):
@@ -97,10 +97,15 @@ def _run_in_pool(
 
 
 @contextmanager
-def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(
+    processes: int, function: Callable[[Argument], Result]
+) -> Iterator[ProcessPoolExecutor]:
     """A pool whose workers exit with this block; tasks that have not started are cancelled."""
-    # Not fork: it copies the locks of threads that numba or matplotlib may have started.
-    context = multiprocessing.get_context('spawn')
+    # Not fork: it copies the locks of threads that numba or matplotlib may have started. The
+    # server, from which workers are forked, has no threads, and imports what the first of them
+    # need once for all.
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload([function.__module__])
     pipe_end, lifeline = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(
         processes, mp_context=context, initializer=_initialise_worker, initargs=(pipe_end,)
@@ -159,7 +164,7 @@ class _IsolatedWorkers(Generic[Argument, Result]):
         """Start a worker on the next task, if there is one."""
         if self._waiting:
             pool_stack = self._stack.enter_context(ExitStack())
-            self._submit_next(pool_stack, pool_stack.enter_context(_pool(1)))
+            self._submit_next(pool_stack, pool_stack.enter_context(_pool(1, self._function)))
 
     def _submit_next(self, pool_stack: ExitStack, pool: ProcessPoolExecutor) -> None:
         key, argument = self._waiting[0]

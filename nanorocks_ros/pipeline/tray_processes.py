@@ -76,7 +76,9 @@ class TrayProcess:
     """
 
     def __init__(self) -> None:
-        context = get_context('spawn')
+        # Of several processes the first alone imports what all of them need.
+        context = get_context('forkserver')
+        context.set_forkserver_preload([__name__])
         self._connection, remote = context.Pipe()
         self._process = context.Process(target=_serve, args=(remote,), daemon=True)
         self._memory: SharedMemory | None = None
