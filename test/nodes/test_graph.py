@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import time
+
 import numpy as np
 import pytest
 
@@ -24,11 +27,19 @@ def listening_to(graph, topic, count=1):
 
 
 def test_a_bag_through_separate_nodes_gives_the_same_numbers_as_offline(graph):
-    """And a subscriber that comes when all is over still gets the final restitution."""
+    """Though the fitter is held up, and speeds and contacts wait for it side by side.
+
+    And a subscriber that comes when all is over still gets the final restitution.
+    """
     arrays = ResultArrays(graph.node)
     stages = [graph.start_program(name) for name in STAGES]
     listening_to(graph, topics.SPEED, 2)
     player = graph.start_program('bag_player', f'bag:={SAMPLE}', 'rate:=0.0', 'listeners:=3')
+    while player.poll() is None:
+        stages[-1].send_signal(signal.SIGSTOP)
+        time.sleep(0.4)
+        stages[-1].send_signal(signal.SIGCONT)
+        graph.executor.spin_once(timeout_sec=0.1)
     finished = graph.wait(player)
     assert finished.code == 0, finished.output
     graph.until(lambda: arrays.final_cors())
