@@ -97,9 +97,7 @@ def _run_in_pool(
 
 
 @contextmanager
-def _pool(
-    processes: int, function: Callable[[Argument], Result]
-) -> Iterator[ProcessPoolExecutor]:
+def _pool(processes: int, function: Callable[[Argument], Result]) -> Iterator[ProcessPoolExecutor]:
     """A pool whose workers exit with this block; tasks that have not started are cancelled."""
     # Not fork: it copies the locks of threads that numba or matplotlib may have started. The
     # server, from which workers are forked, has no threads, and imports what the first of them

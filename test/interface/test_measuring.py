@@ -15,7 +15,7 @@ DIAMETER_PX = 77.4
 @pytest.fixture(scope='module')
 def film(tmp_path_factory):
     path = tmp_path_factory.mktemp('films') / 'film.avi'
-    nr.simulate(tray=1, duration=9.0, restitution=TRUTH, wall_restitution=WALLS, seed=1, film=path)
+    nr.simulate(tray=1, duration=7.0, restitution=TRUTH, wall_restitution=WALLS, seed=1, film=path)
     return path
 
 

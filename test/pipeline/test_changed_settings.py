@@ -92,7 +92,7 @@ def last_restitution(settings, change_after=None, later=None):
 
 def test_a_prior_changed_in_a_cycle_gives_what_it_gives_from_the_start():
     # Each live estimate takes as long as the last one.
-    before = with_values(BEFORE, {'cooling.update_interval': 5.0}, 'test')
+    before = with_values(BEFORE, {'cooling.update_interval': 20.0}, 'test')
     after = with_values(before, {'prior.min_wall_restitution': 0.96}, 'test')
     changed = last_restitution(before, 400, after)
     assert changed.status is CorStatus.FINAL

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.coverage import coverage
 from benchmarks.drawn_friction import SHARES, drawn_cycle
 
-TRAY, CYCLES = 1, 16
+TRAY, CYCLES = 1, 12
 
 
 @pytest.fixture(scope='module', params=[(0.0, 0.0), (0.0, 0.01), (0.02, 0.03)], ids=str)

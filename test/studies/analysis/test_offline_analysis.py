@@ -23,7 +23,7 @@ from nanorocks_ros.recordings.bag.reader import open_bag
 from nanorocks_ros.recordings.bag.writer import BagWriter
 from nanorocks_ros.recordings.messages.message_builders import image_message, time_message
 from nanorocks_ros.records import CorEstimate, SpeedEstimate
-from nanorocks_ros.settings import PipelineSettings
+from nanorocks_ros.settings import CoolingSettings, PipelineSettings
 from nanorocks_ros.studies.analysis.offline_analysis import analyse
 from nanorocks_ros.studies.analysis.results.results_folder import write_results
 from nanorocks_ros.studies.analysis.results.results_json import as_json
@@ -218,7 +218,7 @@ def test_the_command_prints_the_same_numbers_bit_for_bit_as_one_json_object(
 
 
 def test_the_command_prints_the_restitution_beside_the_truth_for_people(capsys):
-    assert run('analyse', SAMPLE, '--no-output') == 0
+    assert run('analyse', SAMPLE, '--no-output', '--cooling-update-interval', '20') == 0
     text = capsys.readouterr().out
     assert 'cycle 1: COR 0.' in text
     assert 'truth:   COR 0.89, walls 0.99' in text
@@ -226,7 +226,8 @@ def test_the_command_prints_the_restitution_beside_the_truth_for_people(capsys):
 
 def test_a_parameter_file_for_the_nodes_does_for_the_command(analysis, capsys, tmp_path):
     path = tmp_path / 'mine.yaml'
-    path.write_text('/**:\n  ros__parameters:\n    cooling: {probability: 0.5}\n')
+    cooling = '{probability: 0.5, update_interval: 20.0}'
+    path.write_text(f'/**:\n  ros__parameters:\n    cooling: {cooling}\n')
     assert run('analyse', SAMPLE, '--json', '--no-output', '--parameters', path) == 0
     narrow, wide = (
         cycle['restitution_upper'] - cycle['restitution_lower']
@@ -384,6 +385,7 @@ def test_a_second_pass_says_what_one_alone_does(tmp_path):
     name = topics.RAW_COMPRESSED.absolute()
     source = open_bag(SAMPLE)
     shown, length = 9 * NS, 10 * NS
+    settings = PipelineSettings(cooling=CoolingSettings(update_interval=3.0))
 
     def cycles(passes):
         path = tmp_path / f'{passes} passes'
@@ -393,7 +395,7 @@ def test_a_second_pass_says_what_one_alone_does(tmp_path):
                     if message.log_time_ns < source.start_ns + shown:
                         content = source.deserialize(message)
                         bag.write(name, message.log_time_ns + again * length, content)
-        return as_json(analyse(path, PipelineSettings()))['trays']['1']['cycles']
+        return as_json(analyse(path, settings))['trays']['1']['cycles']
 
     # Contacts of the last seconds count, though time goes back before they are known.
     (alone,) = cycles(1)

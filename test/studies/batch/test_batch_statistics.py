@@ -15,7 +15,7 @@ from nanorocks_ros.cli.main import main
 def batch(tmp_path_factory):
     """Two bags, one too short for velocities, analysed with statistics."""
     folder = tmp_path_factory.mktemp('statistics')
-    short_film(folder / 'bags' / 'long', 1, 8.0)
+    short_film(folder / 'bags' / 'long', 1, 5.0)
     short_film(folder / 'bags' / 'short', 2, 1.6)
     arguments = ['analyse', str(folder / 'bags'), '-o', str(folder / 'results')]
     assert main([*arguments, '--statistics', '--workers', '1']) == 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -39,16 +41,19 @@ def places_of(random, count=9):
 
 def lit_frame(random, places, towards, look):
     floor, bead, ambient, exponent = look
-    y, x = (np.mgrid[: FINER * SIZE[0], : FINER * SIZE[1]] + 0.5) / FINER - 0.5
-    light = np.broadcast_to((floor / 255.0) ** exponent, (*x.shape, 3)).copy()
+    shape = FINER * SIZE[0], FINER * SIZE[1]
+    light = np.broadcast_to((floor / 255.0) ** exponent, (*shape, 3)).copy()
     for column, row in places:
+        first = [math.floor(FINER * (middle - RADIUS)) for middle in (row, column)]
+        beside = tuple(slice(k, k + math.ceil(FINER * (2.0 * RADIUS + 2.0))) for k in first)
+        y, x = (np.mgrid[beside] + 0.5) / FINER - 0.5
         across, down = (x - column) / RADIUS, (y - row) / RADIUS
         inside = across**2 + down**2 < 1.0
         across, down = across[inside], down[inside]
         up = np.sqrt(1.0 - across**2 - down**2)
         lit = np.maximum(across * towards[0] + down * towards[1] + up * towards[2], 0.0)
         share = ambient + (1.0 - ambient) * lit
-        light[inside] = share[:, None] * (bead / 255.0) ** exponent
+        light[beside][inside] = share[:, None] * (bead / 255.0) ** exponent
     light = cv2.resize(light, SIZE[::-1], interpolation=cv2.INTER_AREA)
     light = cv2.GaussianBlur(light, (0, 0), 0.9)
     frame = 255.0 * np.clip(light, 0.0, 1.0) ** (1.0 / exponent)
