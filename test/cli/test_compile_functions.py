@@ -73,8 +73,8 @@ def test_the_summary_is_an_object(compile_some, tmp_path):
 
 def test_an_interruption_keeps_what_was_compiled(compile_some, tmp_path):
     process = compile_some(4, '--workers', '1')
-    # An index is written when its function is compiled.
-    while len(list(tmp_path.glob('kernels/*/*.nbi'))) < 3:
+    # The code of a function is written when it is compiled, after the index that names it.
+    while len(list(tmp_path.glob('kernels/*/*.nbc'))) < 3:
         assert process.poll() is None, process.communicate()[1]
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)
