@@ -3,7 +3,8 @@
 Rebounds from the side walls show a friction that is a lower estimate of the true one, since beads
 that roll, or slip in the vertical direction, too, lose less, and what floor and lid take off
 beside a rebound counts as drag: of friction / (1 + friction / 0.1), with 0.01 and 0.03 simulated
-(trays 1 and 3, `benchmarks.friction`), 0.5 to 0.65 were found. So anything from 0.4 to 0.8 is.
+(trays 1 and 3, no longer measured by a command), 0.5 to 0.65 were found. So anything from 0.4 to
+0.8 is.
 """
 
 from __future__ import annotations
