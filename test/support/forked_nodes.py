@@ -5,6 +5,7 @@ What a start is by itself, `python -m nanorocks_ros.nodes`, is tested with progr
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import runpy
@@ -48,8 +49,10 @@ class ForkedNode:
         return self._process.exitcode
 
     def send_signal(self, number):
+        # One that just ended is gone before its exit code is known here.
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, number)
 
     def kill(self):
         self.send_signal(signal.SIGKILL)
