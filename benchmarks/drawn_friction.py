@@ -4,13 +4,15 @@ Trays, gases and their starts are drawn as for `drawn_films`, at 15 to 60 frames
 of places of 0.05 to 0.2 px beside shared ones: what is wrong here is physics, what is wrong in
 films alone is recognition. The second table tells friction and drag as they are, and reads the
 walls with shares of what hits of floor and lid take off: their mean error over the stated one is
-0 where the share is right.
+0 where the share is right. Its last column is the share of friction that the rebounds of a row
+together show, with its 68 % interval.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,17 +27,24 @@ from nanorocks_ros.inference.contacts.contact_likelihood import marginal
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
 from nanorocks_ros.inference.contacts.dragged_contacts import dragged
 from nanorocks_ros.inference.contacts.rubbed_rebounds import ROLLING, rubbed_table
+from nanorocks_ros.inference.decay.friction_weights import shown_at_most
 from nanorocks_ros.inference.likelihood_1d import Likelihood1D, Posterior1D
 from nanorocks_ros.jobs.tasks import Workers, run_tasks
 from nanorocks_ros.records import NS, Headline, Interval, PairCollision, Rebound
 from nanorocks_ros.settings import PriorSettings, SimulationSettings, with_values
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 _CYCLES = {1: 80, 3: 40}
 _SECONDS, _FIRST = 25.0, 1.75
 _RATES, _JITTERS = (15.0, 24.0, 30.0, 60.0), (0.05, 0.1, 0.2)
 _ENDS = np.array([0.025, 0.5, 0.975])
+_MIDDLE = np.array([0.16, 0.5, 0.84])
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of what a hit takes off a bead that slides."""
+SHOWN = np.linspace(0.0, 1.5, 301)
+"""Shares of `shown_at_most`."""
 _WALLS = np.linspace(0.5, 1.0, 251)
 _FEWEST = 5
 _PRIOR = PriorSettings()
@@ -56,6 +65,9 @@ class DrawnCycle:
         Error of the walls over the stated one for each of `SHARES`, with friction and drag known.
     known : float
         Half of the 95 % interval of the walls by rebounds, with friction and drag known.
+    shown : ndarray (n,)
+        Log likelihood of `SHOWN` by the tangential speeds of the rebounds; NaN without friction or
+        rebounds.
     """
 
     beads: Interval
@@ -64,6 +76,7 @@ class DrawnCycle:
     from_contacts: bool
     pulls: tuple[float, ...]
     known: float
+    shown: NDArray[np.float64]
 
 
 def report() -> None:
@@ -98,8 +111,8 @@ def report() -> None:
     print('\n| tray | drag [1/s] | friction | known | over ideal |', end='')
     print(
         ''.join(f' share {share:g} |' for share in SHARES)
-        + '\n'
-        + '| --- ' * (5 + len(SHARES))
+        + ' friction shown |\n'
+        + '| --- ' * (6 + len(SHARES))
         + '|'
     )
     for (number, drag, friction), read in by_case.items():
@@ -110,8 +123,19 @@ def report() -> None:
         pulls = np.nanmean([cycle.pulls for cycle in read], axis=0)
         cells = ' | '.join(f'{pull:+.2f}' for pull in pulls)
         print(
-            f'| {number} | {drag:g} | {friction:g} | {known:.4f} | {known / ideal:.2f} | {cells} |'
+            f'| {number} | {drag:g} | {friction:g} | {known:.4f} | {known / ideal:.2f} | {cells} '
+            f'| {_share_text(read)} |'
         )
+
+
+def _share_text(cycles: list[DrawnCycle]) -> str:
+    logs = np.array([cycle.shown for cycle in cycles])
+    together = np.nansum(logs, axis=0)
+    if not together.any():
+        return ''
+    share = Likelihood1D(restitution=SHOWN, log_likelihood=together).posterior((0.0, SHOWN[-1]))
+    lower, median, upper = share.quantiles(_MIDDLE)
+    return f'{median:.2f} [{lower:.2f}, {upper:.2f}]'
 
 
 def _cycle_of(task: tuple[int, int, float, float]) -> DrawnCycle:
@@ -134,11 +158,12 @@ def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCyc
     tracks = list(true_tracks(tray, settings, 0, round(_SECONDS * rate), jitter))
     contacts = contacts_of(nominal, iter(tracks))
     estimate = estimate_of_tracks(nominal, tracks, contacts, [run, 5])
-    terms = ContactTerms.of(
-        dragged(contact, drag)
+    read = [
+        contact
         for contact in contacts
         if isinstance(contact, Rebound | PairCollision) and contact.stamp_ns >= _FIRST * NS
-    )
+    ]
+    terms = ContactTerms.of(dragged(contact, drag) for contact in read)
     errors = [
         Interval(*(limit - float(values[name]) for limit in (own.value, own.lower, own.upper)))
         for own, name in (
@@ -158,7 +183,17 @@ def drawn_cycle(number: int, run: int, drag: float, friction: float) -> DrawnCyc
         pulls=tuple((walls.mean - truth) / walls.deviation for walls in shared)
         or (math.nan,) * len(SHARES),
         known=0.5 * float(np.ptp(rolling.quantiles(_ENDS))) if rolling else math.nan,
+        shown=_shares(friction, read),
     )
+
+
+def _shares(friction: float, contacts: list[Rebound | PairCollision]) -> NDArray[np.float64]:
+    # As the stages read them, which do not know the drag.
+    likelihood = ContactTerms.of(contacts).friction_likelihood
+    if likelihood is None or friction == 0.0:
+        return np.full(SHOWN.size, math.nan)
+    shown = SHOWN * shown_at_most(np.array(friction))
+    return np.interp(shown, likelihood.restitution, likelihood.log_likelihood)
 
 
 def _walls(terms: ContactTerms, known: tuple[float, float], share: float) -> Posterior1D:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.coverage import coverage
-from benchmarks.drawn_friction import SHARES, drawn_cycle
+from benchmarks.drawn_friction import SHARES, SHOWN, drawn_cycle
 
 TRAY, CYCLES = 1, 12
 
@@ -40,3 +40,15 @@ def test_hits_take_off_a_part_of_what_sliding_beads_would_lose(case):
         assert pulls[0.0] < -0.4
         assert pulls[1.0] > 0.3
     assert abs(pulls[0.5]) < 0.5
+
+
+def test_rebounds_show_the_share_of_friction_that_is_assumed(case):
+    (_, friction), cycles = case
+    together = np.sum([cycle.shown for cycle in cycles], axis=0)
+    if not friction:
+        assert np.isnan(together).all()
+        return
+    # What rebounds of so few cycles do not exclude meets what `friction_weights` assumes.
+    possible = SHOWN[together > together.max() - 2.0]
+    assert possible[0] < 0.8
+    assert possible[-1] > 0.4

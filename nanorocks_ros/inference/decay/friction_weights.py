@@ -2,9 +2,8 @@
 
 Rebounds from the side walls show a friction that is a lower estimate of the true one, since beads
 that roll, or slip in the vertical direction, too, lose less, and what floor and lid take off
-beside a rebound counts as drag: of friction / (1 + friction / 0.1), with 0.01 and 0.03 simulated
-(trays 1 and 3, no longer measured by a command), 0.5 to 0.65 were found. So anything from 0.4 to
-0.8 is.
+beside a rebound counts as drag: a share of friction / (1 + friction / 0.1), which
+`benchmarks.drawn_friction` measures in trays 1 and 3.
 """
 
 from __future__ import annotations
@@ -92,13 +91,24 @@ def friction_weights(prior: PriorSettings, contacts: ContactTerms) -> FrictionWe
     )
     low, high = _SHARE_SHOWN
     shares = low + (high - low) * (np.arange(_SHARES) + 0.5) / _SHARES
-    shown = shares * (_FRICTION / (1.0 + _FRICTION / _ROLLING))[:, np.newaxis]
+    shown = shares * shown_at_most(_FRICTION)[:, np.newaxis]
     logs = np.zeros(shown.shape)
     if likelihood is not None:
         logs = np.interp(shown, likelihood.restitution, likelihood.log_likelihood)
     both = prior_weight[:, np.newaxis] * np.exp(logs - logs.max())
     both /= both.sum()
     return FrictionWeights(friction=_FRICTION, weight=both.sum(axis=1))
+
+
+def shown_at_most(friction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frictions of which rebounds show a share.
+
+    Parameters
+    ----------
+    friction : ndarray
+        Of floor, lid and walls.
+    """
+    return friction / (1.0 + friction / _ROLLING)
 
 
 def _even(friction: NDArray[np.float64]) -> NDArray[np.float64]:
