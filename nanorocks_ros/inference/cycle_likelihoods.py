@@ -51,7 +51,7 @@ class CycleLikelihoods:
         From the closed form: restitution and error of each cycle.
     by_contacts : int
         Cycles of which only the contacts are part.
-    flights : ndarray (n, 9)
+    flights : ndarray (n, 10)
         Table of `flight_table`: with the drag of all cycles together their contacts are read.
     """
 
@@ -122,7 +122,11 @@ class CycleLikelihoods:
             )
             # Another version may have compared other nuisances.
             decay = _decay_from(arrays, 'decay')
-            if decay.gradient.shape[-1] != NUISANCE_COUNT:
+            flights = arrays['flights']
+            if (
+                decay.gradient.shape[-1] != NUISANCE_COUNT
+                or flights.shape[1:] != flight_table(()).shape[1:]
+            ):
                 raise FitError(where, 'was made with other nuisances', _NOT_THERE)
             none = ContactTerms.of(())
             contacts = ContactTerms(
@@ -141,7 +145,7 @@ class CycleLikelihoods:
                 cycles=cycles,
                 decay=replace(decay, rough=rough),
                 contacts=contacts,
-                flights=arrays['flights'],
+                flights=flights,
                 by_form=by_form,
                 by_contacts=int(arrays['by_contacts']),
             )

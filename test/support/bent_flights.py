@@ -10,11 +10,21 @@ from nanorocks_ros.records import FreeFlight
 
 
 def bent_flights(
-    number, drag, acceleration=(0.0, 0.0), *, seed=1, kinks=0.0, friction_rate=0.0, first_ns=0
+    number,
+    drag,
+    acceleration=(0.0, 0.0),
+    *,
+    seed=1,
+    kinks=0.0,
+    friction_rate=0.0,
+    first_ns=0,
+    species=0,
+    relative_drag=1.0,
 ):
     """Flights with Gaussian errors, some as large again by unseen hits.
 
-    `kinks` is the share of flights whose bend is wrong by fifty errors and slows the bead.
+    `drag` is that of the species itself. `kinks` is the share of flights whose bend is wrong by
+    fifty errors and slows the bead.
     """
     rng = np.random.default_rng(seed)
     for k in range(number):
@@ -32,13 +42,13 @@ def bent_flights(
             tray=1,
             cycle=1,
             track=k,
-            species=0,
+            species=species,
             duration=1.0,
             points=30,
             mean_velocity=velocity,
             mean_acceleration=bend,
             acceleration_error=error,
-            relative_drag=1.0,
+            relative_drag=relative_drag,
             reduced_chi_square=float(rng.chisquare(54) / 54.0),
             temperature=temperature,
         )
