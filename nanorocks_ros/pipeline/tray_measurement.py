@@ -53,6 +53,10 @@ _UNCERTAIN = (
     'the motion of camera and tray cannot be told apart for some time; speeds there carry '
     'stabilisation_lost, and rebounds miss the speed of the wall; mount the camera firmly'
 )
+_LATE = (
+    'pictures were taken {:.0f} ms off the times of their stamps; contacts are found by the times '
+    'that beads in flight show; let the camera stamp pictures when it takes them'
+)
 
 
 class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
@@ -140,6 +144,7 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
                 self.recognition.push(tracks, self._tracker.max_speed)
                 notices += self._camera_notices(image, tracks)
                 contacts = self._contacts_in(tracks)
+                notices += self._late_notices(image.stamp_ns)
                 notices += self._scale_notices(tracks, contacts)
                 events += contacts
                 events += self._bodies_in(tracks)
@@ -195,6 +200,15 @@ class TrayMeasurement(RestartingStage[TrayImage, TrayRecord]):
             Notice(stamp_ns=image.stamp_ns, text=f'tray {self._tray.number}: {text}')
             for text in new
         ]
+
+    def _late_notices(self, stamp_ns: int) -> list[Notice]:
+        """What to say of pictures that are not of the times of their stamps, once."""
+        late = self._contacts.late
+        if not late or _LATE in self._noticed:
+            return []
+        self._noticed.add(_LATE)
+        text = f'tray {self._tray.number}: {_LATE.format(1e3 * late)}'
+        return [Notice(stamp_ns=stamp_ns, text=text)]
 
     def _structure_speeds(self, image: TrayImage) -> tuple[SpeedEstimate, ...]:
         if self._selector.uses_structure:

@@ -16,6 +16,7 @@ from nanorocks_ros.pipeline.tray_measurement import TrayMeasurement
 from nanorocks_ros.records import (
     Frame,
     MotionMask,
+    Notice,
     PairCollision,
     Quality,
     Rebound,
@@ -449,3 +450,24 @@ def test_species_are_told_apart(number, tolerance, method):
             [speed.stamp_ns for speed in moving], stamps, expected
         )
         assert ratio.mean() == pytest.approx(1.0, abs=tolerance)
+
+
+def test_pictures_that_are_late_are_noticed_once():
+    rate = 90
+    small = {'width_px': 210, 'height_px': 210, 'first_shake': 0.5, 'seed': 5, 'frame_rate': rate}
+    settings = with_values(SimulationSettings(), small, 'test')
+    stages = PipelineSettings()
+    crop = Preprocessor(stages, trays_of(stages), 'test')
+    estimator = TrayMeasurement(stages, TRAY)
+    every = [frame for frame, _ in film(settings, TRAY, 10 * rate)]
+    late = 3 * np.arange(1, 10 * rate // 3 - 1)
+    # One of three pictures, at the time of the second of them.
+    taken = late + np.random.default_rng(1).integers(-1, 2, late.size)
+    texts = []
+    for stamp, number in zip(late.tolist(), taken.tolist(), strict=True):
+        for image in crop.push(replace(every[number], stamp_ns=every[stamp].stamp_ns)):
+            texts += [record.text for record in measured(estimator, [image], Notice)]
+    (text,) = (text for text in texts if 'stamps' in text)
+    off = float(text.partition(' ms off')[0].rpartition(' ')[2])
+    # Not normally distributed, as is assumed.
+    assert off == pytest.approx(1e3 * np.std(taken - late) / rate, rel=0.5)

@@ -27,6 +27,7 @@ from nanorocks_ros.stages.contacts.pair_tests import MAX_SIGMAS, MIN_SIGNAL, is_
 from nanorocks_ros.stages.contacts.track_buffer import MAX_FLIGHT_POINTS
 from nanorocks_ros.stages.contacts.tray_history import TrayHistory
 from nanorocks_ros.stages.contacts.unmatched_jumps import UnmatchedJumps
+from nanorocks_ros.stages.flights.frame_times import FrameTimes
 from nanorocks_ros.stages.flights.free_flights import free_flight
 from nanorocks_ros.stages.flights.running_drag import RunningDrag
 from nanorocks_ros.stages.stage import RestartingStage
@@ -55,8 +56,8 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
     """Finds rebounds, collisions and the free flights between them in the tracks of one tray.
 
     A contact is complete when the flight after it ends, or is 48 positions long: at most 1.6 s
-    later at 30 frames/s. Lines are fitted in the clock of the gas, by the drag that the flights
-    so far show.
+    later at 30 frames/s, and five pictures more where stamps are off by chance. Lines are fitted
+    in the clock of the gas, by the drag that the flights so far show.
 
     Parameters
     ----------
@@ -87,6 +88,7 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         x, y = self._acceleration.tolist()
         self._segments = FlightSegments(self._tray, (x, y))
         self._history = TrayHistory(3 * MAX_FLIGHT_POINTS)
+        self._frame_times = FrameTimes()
         self._unmatched = UnmatchedJumps()
         self._drag = RunningDrag(self._prior)
         self._segments.use_drag(self._drag.drag, self._drag.ratios)
@@ -96,8 +98,16 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         if self._first_ns is None:
             self._first_ns = record.stamp_ns
         time = (record.stamp_ns - self._first_ns) / _NS
-        self._history.push(time, record)
-        jumps = self._segments.push(time, record, _MAX_GAP_FRAMES * self._history.interval)
+        return tuple(
+            found
+            for taken, tracks in self._frame_times.push(time, record)
+            for found in self._follow(taken, tracks)
+        )
+
+    def _follow(self, time: float, tracks: Tracks) -> tuple[ContactOrFlight, ...]:
+        """Add the tracks of a picture that was taken at a time, [s]."""
+        self._history.push(time, tracks)
+        jumps = self._segments.push(time, tracks, _MAX_GAP_FRAMES * self._history.interval)
         self._unmatched.drop_before(time - 2 * MAX_FLIGHT_POINTS * self._history.interval)
         contacts = [contact for jump in jumps for contact in self._contact_at(jump)]
         flights = self._flights()
@@ -109,6 +119,11 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
     def noise(self) -> NDArray[np.float64]:
         """Variance of positions about flights over that by their errors, (species,)."""
         return self._segments.noise
+
+    @property
+    def late(self) -> float:
+        """How far pictures are off the times of their stamps, [s]; 0 where they are not."""
+        return self._frame_times.scatter
 
     def _flights(self) -> list[FreeFlight]:
         return [
@@ -128,9 +143,14 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         flight ends with the last frame: the contacts before flights of at least 4 positions are
         given out, as far as they pass the tests of `push`. Tracks that go on begin new flights.
         """
+        held = [
+            found
+            for time, tracks in self._frame_times.flush()
+            for found in self._follow(time, tracks)
+        ]
         jumps = self._segments.flush()
         contacts = [contact for jump in jumps for contact in self._contact_at(jump)]
-        return (*contacts, *self._flights())
+        return (*held, *contacts, *self._flights())
 
     def _mass(self, jump: VelocityJump) -> float:
         """Mass of a bead, [kg]; of density 1 where one is not known, since ratios count."""
