@@ -12,11 +12,11 @@ RATE, BEADS, ERROR = 30.0, 15, 8e-6
 PICTURES = 300
 
 
-def pictures(late, *, speed=5e-3, shared=0.0, turns=0.0, seed=1):
+def pictures(late, *, speed=5e-3, shared=0.0, turns=0.0, fall=0.0, drag=0.0, seed=1):
     """Tracks of beads in flight, and by how much each picture is late, [s].
 
-    `shared` displaces all beads of a picture alike, and `turns` is the share of beads that is
-    struck in each picture.
+    `shared` displaces all beads of a picture alike, `turns` is the share that is struck in each
+    picture, and between these they fall, [m/s²], and are slowed, [1/s].
     """
     rng = np.random.default_rng(seed)
     off = np.clip(late * rng.standard_normal(PICTURES), -0.45 / RATE, 0.45 / RATE)
@@ -29,6 +29,7 @@ def pictures(late, *, speed=5e-3, shared=0.0, turns=0.0, seed=1):
         seen = places + off[number] * velocities + rng.normal(0.0, ERROR, places.shape)
         tracks.append(picture(number, seen + shared * rng.standard_normal(2)))
         places = places + velocities / RATE
+        velocities = velocities * np.exp(-drag / RATE) + np.array([fall / RATE, 0.0])
     return tracks, off
 
 
@@ -75,7 +76,16 @@ def test_late_pictures_get_the_times_at_which_they_were_taken(turns):
 
 
 @pytest.mark.parametrize(
-    'values', [{}, {'speed': 5e-4}, {'turns': 0.05}, {'shared': 5e-5}], ids=str
+    'values',
+    [
+        {},
+        {'speed': 5e-4},
+        {'turns': 0.05},
+        {'shared': 5e-5},
+        {'fall': 5e-3, 'turns': 0.02},
+        {'drag': 0.3, 'turns': 0.02},
+    ],
+    ids=str,
 )
 def test_pictures_in_time_are_given_at_once_with_the_times_of_their_stamps(values):
     tracks, _ = pictures(0.0, **values)
