@@ -2,8 +2,9 @@
 
 Rebounds from the side walls show a friction that is a lower estimate of the true one, since beads
 that roll, or slip in the vertical direction, too, lose less, and what floor and lid take off
-beside a rebound counts as drag: a share of friction / (1 + friction / 0.1), which
-`benchmarks.drawn_friction` measures in trays 1 and 3.
+beside a rebound counts as drag: a share of friction / (1 + friction / 0.1). From 0.4 to 0.8 is
+taken; `benchmarks.drawn_friction` found 0.7 to 0.95 with frictions of 0.01 and 0.03, and 0.45 with
+0.1 (trays 1 and 3).
 """
 
 from __future__ import annotations
