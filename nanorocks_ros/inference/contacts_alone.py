@@ -178,7 +178,7 @@ def contacts_alone(
             number: walls([rebound for rebound in rebounds if rebound.wall == number])
             for number in numbers
         },
-        drag=losses.drag,
+        drag=losses.of_first_species(losses.drag),
     )
 
 

@@ -201,7 +201,7 @@ def restitution_sources(
         walls=wall_likelihood.posterior(walls) if wall_likelihood else None,
         wall_friction=friction,
         headline=headline,
-        drag=drag,
+        drag=losses.of_first_species(drag) if losses else drag,
         dependence=dependence,
     )
 

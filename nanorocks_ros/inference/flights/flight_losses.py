@@ -12,14 +12,15 @@ vertical speeds, whatever the horizontal speed of the bead: friction rate times 
 temperature. A second fit holds both: drag is told from it by the speeds of the beads, and by how
 it stays while the gas cools.
 
-The drag of other species over that of the first goes by their densities and measured sizes, which
-are not exact: it is one more unknown of each, near the expected one.
+The drag of other species over that of the first goes by their densities and measured sizes. What
+is wrong with these is wrong with the drag of the first, as far as flights of others tell it, and
+not with what slows the others.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,8 +47,6 @@ _MAX_CHI_SQUARE, _HUBER = 2.4, 2.0
 # Slower beads say nothing of drag, and hardly move in the picture, [m/s].
 _MIN_SPEED = 1e-4
 _ROUNDS, _CONVERGED = 20, 1e-3
-# Parameters of the fit without friction that all species share: drag and two accelerations.
-_SHARED = 3
 # Median of the length of a two-dimensional Gaussian vector of unit variance.
 _MEDIAN_LENGTH = 1.1774
 # Errors by which an acceleration differs from 0: chance does so once in 500 cycles.
@@ -56,11 +55,8 @@ _SIGMAS = 3.5
 _REACH, _GRID = 5.0, 101
 # Relative error of the drag of another species over that of the first: measured radii of beads of
 # some pixels are up to 10 % large (glass with highlights), and densities of a kind of glass differ
-# by 4 %. By the ratio alone drags of 0.02 and 0.07 /s came out up to 20 % high in films of tray 3,
-# with stated errors of 2 % (`benchmarks.friction_films`).
+# by 4 %. In films of tray 3 drags came out up to 20 % high (`benchmarks.friction_films`).
 _RATIO_ERROR = 0.1
-# Of these, the most that a ratio is believed to be off.
-_MOST_OFF = 3.0
 # Errors beside friction are larger than by the scatter: beads roll, and hits are single events.
 # With frictions of 0.01 and 0.03 drags scattered by 2 to 2.6 times that, when it was measured.
 _RUBBED_ERRORS = 2.0
@@ -128,8 +124,9 @@ class FlightLosses:
         Drag and friction rate, where both may be; neither is below 0.
     fitted : Slowing
         The same as the flights tell them, also below 0.
-    ratios : dict of int to float
-        Drags of other species than the first, over that of the first, over what is expected.
+    ratio_error : float
+        Relative error of the drag of the first species by what its ratio to the others is taken to
+        be. It changes nothing of how these are slowed, and is in no other error.
     """
 
     drag: Measured = UNKNOWN_MEASURED
@@ -138,7 +135,11 @@ class FlightLosses:
     flights: int = 0
     rubbed: Slowing
     fitted: Slowing
-    ratios: dict[int, float] = field(default_factory=dict)
+    ratio_error: float = 0.0
+
+    def of_first_species(self, drag: Measured) -> Measured:
+        """A drag by flights of all species as that of the first, with the error of the ratio."""
+        return Measured(drag.value, math.hypot(drag.error, self.ratio_error * drag.value))
 
     @property
     def slowing(self) -> Slowing:
@@ -221,20 +222,26 @@ def flight_losses(table: NDArray[np.float64], prior: Measured) -> FlightLosses:
             fitted=Slowing.by_drag(drag),
         )
     design = _design(used)
-    fit, covariance = _with_prior(*_fit(used, design[:, :, :3]), prior)
-    both, errors = _with_prior(*_fit(used, design), prior)
+    fit, covariance = _with_prior(*_robust_fit(used, design[:, :, :3]), prior)
+    both, errors = _with_prior(*_robust_fit(used, design), prior)
     fitted = Slowing(
         values=both[[0, 3]], covariance=_RUBBED_ERRORS**2 * errors[np.ix_([0, 3], [0, 3])]
     )
     return FlightLosses(
         drag=Measured(float(fit[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))),
-        acceleration=fit[1:3],
-        covariance=covariance[1:3, 1:3],
+        acceleration=fit[1:],
+        covariance=covariance[1:, 1:],
         flights=len(used),
         rubbed=_not_below_zero(fitted.values, fitted.covariance),
         fitted=fitted,
-        ratios=_ratios(used, fit),
+        ratio_error=_RATIO_ERROR * _share_of_others(used, design),
     )
+
+
+def _share_of_others(flights: NDArray[np.float64], design: NDArray[np.float64]) -> float:
+    """Which part of what flights tell of the drag is told by other species than the first."""
+    told = (design[:, :, 0] ** 2).sum(axis=1) / _errors(flights) ** 2
+    return float(told[flights[:, 9] != 0].sum() / told.sum())
 
 
 def _not_below_zero(fit: NDArray[np.float64], covariance: NDArray[np.float64]) -> Slowing:
@@ -261,16 +268,13 @@ def _not_below_zero(fit: NDArray[np.float64], covariance: NDArray[np.float64]) -
     return Slowing(values=mean, covariance=(weight[:, np.newaxis] * off).T @ off)
 
 
-def drag_of_flights(
-    table: NDArray[np.float64], prior: Measured
-) -> tuple[Measured, dict[int, float]]:
-    """The drag and the ratios of `flight_losses` alone, in half the time."""
+def drag_of_flights(table: NDArray[np.float64], prior: Measured) -> Measured:
+    """The drag of `flight_losses` alone, in half the time."""
     used = _usable(table)
     if len(used) < MIN_FLIGHTS:
-        return prior, {}
-    fit, covariance = _with_prior(*_fit(used, _design(used)[:, :, :3]), prior)
-    drag = Measured(float(fit[0]), math.sqrt(max(float(covariance[0, 0]), 0.0)))
-    return drag, _ratios(used, fit)
+        return prior
+    fit, covariance = _with_prior(*_robust_fit(used, _design(used)[:, :, :3]), prior)
+    return Measured(float(fit[0]), math.sqrt(max(float(covariance[0, 0]), 0.0)))
 
 
 def _design(flights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -301,55 +305,25 @@ def _usable(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return moving[chi_square <= _MAX_CHI_SQUARE * np.median(chi_square)]
 
 
-def _fit(
-    flights: NDArray[np.float64], design: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Parameters, (k,), and covariance of a fit; of the drags of other species last.
-
-    These are what their drags exceed the expected ones by, in the drag of the first.
-    """
-    parameters = design.shape[2]
-    fit, covariance = _robust_fit(flights, design, np.zeros(parameters))
-    others = _other_species(flights)
-    if not (others and fit[0] > 0.0):
-        # What is slowed by nothing tells no ratio.
-        return fit, covariance
-    extra = [design[:, :, 0] * (flights[:, 9] == species)[:, np.newaxis] for species in others]
-    design = np.concatenate([design, np.stack(extra, axis=-1)], axis=-1)
-    known = np.zeros(design.shape[2])
-    known[parameters:] = 1.0 / (_RATIO_ERROR * fit[0]) ** 2
-    return _robust_fit(flights, design, known)
-
-
-def _other_species(flights: NDArray[np.float64]) -> list[int]:
-    return sorted({int(species) for species in flights[:, 9]} - {0})
-
-
-def _ratios(flights: NDArray[np.float64], fit: NDArray[np.float64]) -> dict[int, float]:
-    """Drags of other species over the expected ones, by a fit without friction."""
-    if fit.size == _SHARED or fit[0] <= 0.0:
-        return {}
-    ratios = 1.0 + fit[_SHARED:] / fit[0]
-    # A drag that is hardly told from 0 tells no ratio.
-    low, high = 1.0 - _MOST_OFF * _RATIO_ERROR, 1.0 + _MOST_OFF * _RATIO_ERROR
-    return dict(zip(_other_species(flights), np.clip(ratios, low, high).tolist(), strict=True))
+def _errors(flights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the accelerations, with what unseen kinks do."""
+    kinks = _KINK_SHARE * (flights[:, 5] / _KINK_POINTS) ** _KINK_POWER
+    return np.asarray(flights[:, 4] * np.hypot(1.0, kinks))
 
 
 def _robust_fit(
-    flights: NDArray[np.float64], design: NDArray[np.float64], known: NDArray[np.float64]
+    flights: NDArray[np.float64], design: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Parameters of the accelerations of flights, (k,), and their covariance, (k, k).
 
-    `design`, (n, 2, k), holds the derivatives of both accelerations by the parameters, and
-    `known`, (k,), how well these are known to be 0 before: one over the variance.
+    `design`, (n, 2, k), holds the derivatives of both accelerations by the parameters.
     """
     measured = flights[:, 2:4]
-    kinks = _KINK_SHARE * (flights[:, 5] / _KINK_POINTS) ** _KINK_POWER
-    error = flights[:, 4] * np.hypot(1.0, kinks)
+    error = _errors(flights)
     trust = np.ones(len(flights))
     for _ in range(_ROUNDS):
         weight = trust / error**2
-        normal = np.einsum('n,nci,ncj->ij', weight, design, design) + np.diag(known)
+        normal = np.einsum('n,nci,ncj->ij', weight, design, design)
         fit = np.linalg.solve(normal, np.einsum('n,nci,nc->i', weight, design, measured))
         rest = measured - design @ fit
         length = np.hypot(*rest.T) / error
@@ -362,4 +336,4 @@ def _robust_fit(
     hat = np.einsum('n,nci,ij,ndj->ncd', weight, design, inverse, design)
     rest = np.linalg.solve(np.eye(2) - hat, rest[:, :, np.newaxis])[:, :, 0]
     scores = np.einsum('n,nci,nc->ni', weight, design, rest)
-    return fit, inverse @ (scores.T @ scores + np.diag(known)) @ inverse
+    return fit, inverse @ (scores.T @ scores) @ inverse

@@ -29,6 +29,7 @@ from nanorocks_ros.stages.contacts.tray_history import TrayHistory
 from nanorocks_ros.stages.contacts.unmatched_jumps import UnmatchedJumps
 from nanorocks_ros.stages.flights.frame_times import FrameTimes
 from nanorocks_ros.stages.flights.free_flights import free_flight
+from nanorocks_ros.stages.flights.relative_drag import relative_drag
 from nanorocks_ros.stages.flights.running_drag import RunningDrag
 from nanorocks_ros.stages.stage import RestartingStage
 
@@ -91,7 +92,7 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         self._frame_times = FrameTimes()
         self._unmatched = UnmatchedJumps()
         self._drag = RunningDrag(self._prior)
-        self._segments.use_drag(self._drag.drag, self._drag.ratios)
+        self._segments.use_drag(self._drag.drag)
 
     def _process(self, record: Tracks) -> tuple[ContactOrFlight, ...]:
         """Add the tracks of a frame and return the contacts that are complete now."""
@@ -112,7 +113,7 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
         contacts = [contact for jump in jumps for contact in self._contact_at(jump)]
         flights = self._flights()
         if self._drag.push(time, flights):
-            self._segments.use_drag(self._drag.drag, self._drag.ratios)
+            self._segments.use_drag(self._drag.drag)
         return (*contacts, *flights)
 
     @property
@@ -236,7 +237,7 @@ class ContactFinder(RestartingStage[Tracks, ContactOrFlight]):
 
     def _drag_times(self, jump: VelocityJump, crossing: Intersection) -> tuple[float, float]:
         """From the middle of both flights to the contact, times the drag of the bead."""
-        relative = self._segments.relative_drag(jump)
+        relative = relative_drag(self._tray, jump.species, jump.radius)
         before, after = jump.lines[:, 0].tolist()
         return relative * (crossing.time - before), relative * (after - crossing.time)
 

@@ -21,11 +21,9 @@ from nanorocks_ros.stages.contacts.segmentation_kernels import (
 )
 from nanorocks_ros.stages.contacts.track_buffer import TrackBuffer, reset_slot
 from nanorocks_ros.stages.flights.bend_fits import BEND_SIZE
-from nanorocks_ros.stages.flights.relative_drag import relative_drag, relative_drags
+from nanorocks_ros.stages.flights.relative_drag import relative_drags
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.records import Tracks
 
@@ -149,8 +147,6 @@ class FlightSegments:
         self._flights: list[FlightBend] = []
         self._relative_drags = relative_drags(tray)
         self._mean_radii = np.array([0.5 * kind.diameter for kind in species])
-        self._tray = tray
-        self._ratios: Mapping[int, float] = {}
         self.drag = 0.0
 
     def take_flights(self) -> list[FlightBend]:
@@ -177,29 +173,20 @@ class FlightSegments:
         low, high = (1.0 - _MOST_ENLARGED) * told, (1.0 + _MOST_ENLARGED) * told
         return float(np.clip(weighted / weights, low, high))
 
-    def use_drag(self, drag: float, ratios: Mapping[int, float]) -> None:
+    def use_drag(self, drag: float) -> None:
         """Fit lines in the clock of a gas from now on.
 
         Parameters
         ----------
         drag : float, >= 0, [1/s]
             Of beads of the first species.
-        ratios : mapping of int to float
-            What the drags of species are over the expected ones.
         """
-        self.drag, self._ratios = drag, ratios
+        self.drag = drag
         radii = self._sizes[:, 0]
         larger = np.divide(
             radii, self._mean_radii[self._species], out=np.ones_like(radii), where=radii > 0.0
         )
-        found = np.array([ratios.get(species, 1.0) for species in range(len(self._mean_radii))])
-        relative = found * self._relative_drags
-        self._buffer.drags[:] = drag * relative[self._species] / larger**2
-
-    def relative_drag(self, jump: VelocityJump) -> float:
-        """Drag of a bead over that of a bead of mean size of the first species, as found."""
-        expected = relative_drag(self._tray, jump.species, jump.radius)
-        return self._ratios.get(jump.species, 1.0) * expected
+        self._buffer.drags[:] = drag * self._relative_drags[self._species] / larger**2
 
     def push(self, time: float, tracks: Tracks, max_gap: float) -> list[VelocityJump]:
         """Append the positions of the next frame.
@@ -268,7 +255,7 @@ class FlightSegments:
         self._track_slots = np.array(slots, dtype=np.int64)
         used = self._track_slots >= 0
         self._species[self._track_slots[used]] = tracks.species[used]
-        self.use_drag(self.drag, self._ratios)
+        self.use_drag(self.drag)
         return sorted(self._slots.keys() - set(track_ids))
 
     def _slot_of(self, track: int) -> int:

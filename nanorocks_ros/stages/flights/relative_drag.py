@@ -13,8 +13,6 @@ import numpy as np
 from nanorocks_ros.physics.stokes_drag import stokes_rate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from nanorocks_ros.experiment.trays import Tray
@@ -47,18 +45,11 @@ def _density(tray: Tray, species: int) -> float:
     return 1.0 if alike else tray.species[species].density
 
 
-def mean_relative_drag(tray: Tray, ratios: Mapping[int, float]) -> float:
+def mean_relative_drag(tray: Tray) -> float:
     """Drag of the mean speed of a tray over that of a bead of the first species.
 
     It slows the gas of a mixture as if all beads had that drag, as long as their speeds do not
     drift apart by it.
-
-    Parameters
-    ----------
-    tray : Tray
-    ratios : mapping of int to float
-        What the drags of species are over the expected ones.
     """
     counts = np.array([kind.count for kind in tray.species], dtype=np.float64)
-    found = np.array([ratios.get(species, 1.0) for species in range(len(tray.species))])
-    return float((found * relative_drags(tray)) @ counts / counts.sum())
+    return float(relative_drags(tray) @ counts / counts.sum())

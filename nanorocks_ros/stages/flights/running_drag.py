@@ -31,8 +31,6 @@ class RunningDrag:
     ----------
     drag : float, >= 0, [1/s]
         Of beads of the first species; the mean of the prior until the flights show a drag.
-    ratios : dict of int to float
-        As of `FlightLosses`; empty until then.
     """
 
     def __init__(self, prior: Measured) -> None:
@@ -40,10 +38,9 @@ class RunningDrag:
         self._flights: deque[FreeFlight] = deque(maxlen=_MAX_FLIGHTS)
         self._next_fit = 0.0
         self.drag = max(prior.value, 0.0)
-        self.ratios: dict[int, float] = {}
 
     def push(self, time: float, flights: Iterable[FreeFlight]) -> bool:
-        """Add the flights that ended; whether `drag` or `ratios` are new.
+        """Add the flights that ended; whether `drag` is new.
 
         Parameters
         ----------
@@ -54,10 +51,7 @@ class RunningDrag:
         if time < self._next_fit:
             return False
         self._next_fit = time + _INTERVAL
-        drag, ratios = drag_of_flights(flight_table(self._flights), self._prior)
-        before = self.drag, self.ratios
-        if drag.value > _SIGMAS * drag.error:
-            self.drag, self.ratios = drag.value, ratios
-        else:
-            self.drag, self.ratios = max(self._prior.value, 0.0), {}
-        return (self.drag, self.ratios) != before
+        drag = drag_of_flights(flight_table(self._flights), self._prior)
+        is_known = drag.value > _SIGMAS * drag.error
+        before, self.drag = self.drag, drag.value if is_known else max(self._prior.value, 0.0)
+        return self.drag != before

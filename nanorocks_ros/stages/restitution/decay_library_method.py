@@ -98,6 +98,7 @@ class DecayLibraryMethod:
         self._reading_of = partial(
             rebound_reading, sides=tray.dimensions[:2], readout=prior.readout
         )
+        self._relative_drag = mean_relative_drag(tray)
         check_walls((prior.min_wall_restitution, prior.max_wall_restitution))
         self._ends = ends_of(settings.cooling.probability)
         self._probability = settings.cooling.probability
@@ -165,7 +166,7 @@ class DecayLibraryMethod:
             known.speed,
             known.error,
             self._camera[known.of_grains],
-            self._drag_of_gas(losses),
+            self._drag_of_gas(losses.slowing.drag),
             highest,
             known.age.error,
         )
@@ -188,10 +189,9 @@ class DecayLibraryMethod:
             reduced_chi_square=likelihood.deviation_at(best) / max(likelihood.samples - 1, 1),
         )
 
-    def _drag_of_gas(self, losses: FlightLosses) -> Measured:
+    def _drag_of_gas(self, drag: Measured) -> Measured:
         """Drag of the mean speed of all species, from that of the first."""
-        relative, drag = mean_relative_drag(self._tray, losses.ratios), losses.slowing.drag
-        return Measured(relative * drag.value, relative * drag.error)
+        return Measured(self._relative_drag * drag.value, self._relative_drag * drag.error)
 
     def _drives(self, losses: FlightLosses, decay: Decay) -> bool:
         """Whether beads that fall across the tray gain more than a small part of their energy."""

@@ -18,14 +18,6 @@ def test_flights_with_a_drag_set_it():
     assert running.drag == pytest.approx(0.02, abs=0.002)
 
 
-def test_a_species_that_is_slowed_more_than_expected_tells_its_ratio():
-    running = RunningDrag(WIDE)
-    others = bent_flights(300, 0.04 * 1.15, species=1, relative_drag=2.0)
-    assert running.push(0.0, [*bent_flights(300, 0.02), *others])
-    assert running.ratios[1] == pytest.approx(1.15, abs=0.05)
-    assert not RunningDrag(WIDE).ratios
-
-
 def test_a_drag_that_chance_explains_is_not_used():
     running = RunningDrag(WIDE)
     assert not running.push(0.0, bent_flights(300, 0.0))
