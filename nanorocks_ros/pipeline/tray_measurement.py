@@ -54,7 +54,7 @@ _UNCERTAIN = (
     'stabilisation_lost, and rebounds miss the speed of the wall; mount the camera firmly'
 )
 _LATE = (
-    'pictures were taken {:.0f} ms off the times of their stamps; contacts are found by the times '
+    'pictures were taken {:.2g} ms off the times of their stamps; contacts are found by the times '
     'that beads in flight show; let the camera stamp pictures when it takes them'
 )
 

@@ -150,7 +150,7 @@ class FrameTimes:
 def _time_off(paths: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[float, float]:
     """Median time by which beads in flight are ahead of their lines in the middle picture.
 
-    Beside what displaces all of them alike.
+    What displaces all of them alike is taken out.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def _time_off(paths: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[f
     since = times - times.sum() / (pictures - 1)
     shares, slopes = np.full(pictures, 1.0 / (pictures - 1)), since.copy()
     shares[middle] = slopes[middle] = 0.0
-    slopes /= slopes @ slopes
+    slopes /= (slopes**2).sum()
     # Of beads in flight: their distances from the lines, velocities, and errors of their places.
     found, line = np.empty((5, beads)), np.empty(4)
     count = 0
