@@ -196,7 +196,7 @@ def _print(batch: Batch, combined_results: Combined, prior: PriorSettings) -> No
 
 
 def _tray_lines(tray: TrayMeans) -> list[str]:
-    from nanorocks_ros.records import Quality, headline_in_words
+    from nanorocks_ros.records import headline_in_words
     from nanorocks_ros.studies.batch.means_json import means_as_json
 
     values = means_as_json(tray)
@@ -211,9 +211,11 @@ def _tray_lines(tray: TrayMeans) -> list[str]:
         walls = f', walls {text("wall_restitution")}' if values['wall_restitution'] else ''
         count = values['cycles_read']
         lines.append(f'{counted(count, "cycle")} together: COR {text("restitution")}{walls}')
-        flags = Quality.SPEED_DEPENDENT if restitution.speed_dependent else Quality(0)
         source = headline_in_words(
-            restitution.headline, restitution.tension, restitution.wall_friction, flags
+            restitution.headline,
+            restitution.tension,
+            restitution.wall_friction,
+            restitution.quality,
         )
         lines.append(f'from {source}')
         if restitution.speed_dependent:

@@ -24,6 +24,7 @@ from nanorocks_ros.records import (
     Interval,
     Measured,
     MeasuredInterval,
+    Quality,
 )
 
 if TYPE_CHECKING:
@@ -215,6 +216,8 @@ class MeanRestitution:
     impact_restitution, wall_impact_restitution : Interval
     speed_dependent : bool
         Whether an exponent is not 0.
+    friction_unknown : bool
+        Whether beads count as smooth that may rub.
     """
 
     cycles: int
@@ -242,3 +245,14 @@ class MeanRestitution:
     impact_restitution: Interval = UNKNOWN_INTERVAL
     wall_impact_restitution: Interval = UNKNOWN_INTERVAL
     speed_dependent: bool = False
+    friction_unknown: bool = False
+
+    @property
+    def quality(self) -> Quality:
+        """Flags of a cycle that hold for all of them together."""
+        flags = Quality(0)
+        if self.speed_dependent:
+            flags |= Quality.SPEED_DEPENDENT
+        if self.friction_unknown:
+            flags |= Quality.FRICTION_UNKNOWN
+        return flags

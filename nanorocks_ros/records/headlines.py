@@ -90,13 +90,14 @@ def headline_in_words(
     headline: Headline, tension: float, friction: Measured, quality: Quality = NOTHING_WRONG
 ) -> str:
     """The source of a restitution in a phrase, with the reason where it is not all there is."""
+    smooth = ', of beads that count as smooth' if Quality.FRICTION_UNKNOWN in quality else ''
     match headline:
         case Headline.JOINT:
-            return 'decay and contacts together'
+            return f'decay and contacts together{smooth}'
         case Headline.CONTACTS:
             reason = reason_for_contacts(tension, friction, quality)
             return 'contacts alone' + (f', since {reason}' if reason else '')
         case Headline.DECAY:
-            return 'decay alone'
+            return f'decay alone{smooth}'
         case _:
             return 'unknown'

@@ -86,6 +86,7 @@ class Quality(IntFlag):
     SPEED_DEPENDENT = 16384
     STICKING = 32768
     SKIPPED_FRAMES = 65536
+    FRICTION_UNKNOWN = 131072
 
     def names(self) -> list[str]:
         """Names of the flags that are set, in lower case."""

@@ -130,6 +130,12 @@ FLAGS = {
         'missing that the time stamps do not show',
         'give the frames the times at which they were taken, or film again without losses',
     ),
+    Quality.FRICTION_UNKNOWN: Words(
+        'rebounds do not tell whether the beads rub, so that they count as smooth; the '
+        'restitutions come out too low if they rub',
+        'measure the friction with spare beads and set --prior-friction and '
+        '--prior-friction-error; or film more cycles, or closer, so that more rebounds are seen',
+    ),
 }
 """Meaning and remedy of each flag."""
 

@@ -219,3 +219,11 @@ def test_the_headline_and_its_reason(contacts, tension, friction, expected, word
 )
 def test_a_flag_with_which_the_decay_does_not_count_is_the_reason(quality, words):
     assert words in headline_in_words(Headline.CONTACTS, 0.5, Measured(), quality)
+
+
+@pytest.mark.parametrize('headline', [Headline.DECAY, Headline.JOINT])
+def test_beads_that_count_as_smooth_are_named_beside_the_source(headline):
+    words = headline_in_words(headline, 0.5, Measured(), Quality.FRICTION_UNKNOWN)
+    assert words == headline_in_words(headline, 0.5, Measured()) + (
+        ', of beads that count as smooth'
+    )

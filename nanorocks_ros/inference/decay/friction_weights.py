@@ -2,32 +2,37 @@
 
 Rebounds from the side walls show a friction that is a lower estimate of the true one, since beads
 that roll, or slip in the vertical direction, too, lose less, and what floor and lid take off
-beside a rebound counts as drag: a share of friction / (1 + friction / 0.1). From 0.4 to 0.8 is
-taken; `benchmarks.drawn_friction` found 0.7 to 0.95 with frictions of 0.01 and 0.03, and 0.45 with
-0.1 (trays 1 and 3).
+beside a rebound counts as drag: a share of friction / (1 + friction / 0.05). From 0.6 to 1.1 is
+taken, which contains what `benchmarks.drawn_friction` found for frictions of 0.01 to 0.1.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.special import log_ndtr, ndtri_exp
 
 from nanorocks_ros.inference.decay.friction_terms import HIGHEST_FRICTION
 from nanorocks_ros.numerics.log_sums import log_sum
+from nanorocks_ros.records import walls_rub
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
+    from nanorocks_ros.records import Measured
     from nanorocks_ros.settings import PriorSettings
 
 _FRICTION = HIGHEST_FRICTION * np.linspace(0.0, 1.0, 61) ** 2
-_SHARE_SHOWN, _ROLLING, _SHARES = (0.4, 0.8), 0.1, 14
+_SHARE_SHOWN, _ROLLING, _SHARES = (0.6, 1.1), 0.05, 14
 # Likelihoods of decays are smooth in ln(1 + friction / this).
 _SCALE = 0.01
+# Friction with which the decay of beads that count as smooth is read far too low.
+_STRONG, _CERTAIN = 0.1, 0.95
 # Smallest half width of a prior, of the order of the grid.
 _SHARPEST = 1e-4
 
@@ -99,6 +104,26 @@ def friction_weights(prior: PriorSettings, contacts: ContactTerms) -> FrictionWe
     both = prior_weight[:, np.newaxis] * np.exp(logs - logs.max())
     both /= both.sum()
     return FrictionWeights(friction=_FRICTION, weight=both.sum(axis=1))
+
+
+def is_friction_told(prior: PriorSettings, shown: Measured) -> bool:
+    """Whether a setting tells the friction, or rebounds tell a strong one from none.
+
+    Parameters
+    ----------
+    prior : PriorSettings
+    shown : Measured
+        Friction of the side walls by rebounds; they do where it is above 0, or where what they
+        show of a friction of 0.1 at least is above the upper end of its interval of 95 %.
+    """
+    if prior.friction > 0.0 or walls_rub(shown):
+        return True
+    if not shown.known:
+        return False
+    # Of a Gaussian without its part below 0.
+    beyond = math.log(0.5 * (1.0 - _CERTAIN)) + float(log_ndtr(shown.value / shown.error))
+    upper = shown.value - shown.error * float(ndtri_exp(beyond))
+    return upper < _SHARE_SHOWN[0] * float(shown_at_most(np.array(_STRONG)))
 
 
 def shown_at_most(friction: NDArray[np.float64]) -> NDArray[np.float64]:

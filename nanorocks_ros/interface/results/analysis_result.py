@@ -272,6 +272,6 @@ def _cycle_rows(
             with_interval(value.value, (value.lower, value.upper))
             for value in (cor.restitution, cor.wall_restitution)
         )
-        source = headline_in_words(cor.headline, cor.tension, cor.wall_friction)
+        source = headline_in_words(cor.headline, cor.tension, cor.wall_friction, cor.quality)
         rows.append((recording.name, f'{tray}', f'{cor.cycle}', beads, walls, source))
     return rows

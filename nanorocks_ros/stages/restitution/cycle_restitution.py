@@ -55,6 +55,8 @@ class CycleRestitution:
     wall_restitution_exponent_lower_68, wall_restitution_exponent_upper_68 : float
     speed_dependent : bool
         Whether an exponent is not 0, so that neither the decay nor a constant restitution holds.
+    friction_unknown : bool
+        Whether beads count as smooth that may rub.
     """
 
     determined: bool = False
@@ -97,3 +99,4 @@ class CycleRestitution:
     wall_restitution_exponent_lower_68: float = UNKNOWN
     wall_restitution_exponent_upper_68: float = UNKNOWN
     speed_dependent: bool = False
+    friction_unknown: bool = False

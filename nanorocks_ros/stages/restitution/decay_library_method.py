@@ -19,7 +19,7 @@ from nanorocks_ros.inference.cycle_likelihoods import CycleLikelihoods, MeanRest
 from nanorocks_ros.inference.decay.decay_library_file import library_of
 from nanorocks_ros.inference.decay.decay_likelihood import decay_likelihood
 from nanorocks_ros.inference.decay.decay_tables import tables_of
-from nanorocks_ros.inference.decay.friction_weights import friction_weights
+from nanorocks_ros.inference.decay.friction_weights import friction_weights, is_friction_told
 from nanorocks_ros.inference.decay.haff_fit import fit_haff
 from nanorocks_ros.inference.flights.flight_losses import flight_losses
 from nanorocks_ros.inference.posterior import check_walls
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from nanorocks_ros.experiment.trays import Tray
     from nanorocks_ros.inference.decay.grid_likelihood import DecayLikelihood
     from nanorocks_ros.inference.flights.flight_losses import FlightLosses
+    from nanorocks_ros.inference.restitution_sources import RestitutionSources
     from nanorocks_ros.settings import PipelineSettings
     from nanorocks_ros.stages.restitution.restitution_method import Contacts
 
@@ -146,6 +147,7 @@ class DecayLibraryMethod:
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
             acceleration=losses.magnitude(self._probability),
             accelerated=accelerated,
+            friction_unknown=self._is_friction_unknown(sources),
             **dependence.fields(self._ends, NARROW),
         )
         result = determined(result, sources, self._ends)
@@ -192,6 +194,11 @@ class DecayLibraryMethod:
     def _drag_of_gas(self, drag: Measured) -> Measured:
         """Drag of the mean speed of all species, from that of the first."""
         return Measured(self._relative_drag * drag.value, self._relative_drag * drag.error)
+
+    def _is_friction_unknown(self, sources: RestitutionSources) -> bool:
+        """Whether a decay counts, of beads that count as smooth and may rub."""
+        by_decay = sources.headline is not Headline.CONTACTS
+        return by_decay and not is_friction_told(self._prior, sources.wall_friction)
 
     def _drives(self, losses: FlightLosses, decay: Decay) -> bool:
         """Whether beads that fall across the tray gain more than a small part of their energy."""
@@ -267,6 +274,7 @@ class DecayLibraryMethod:
             headline=sources.headline,
             wall_friction=sources.wall_friction,
             drag=sources.drag if losses.flights else UNKNOWN_MEASURED,
+            friction_unknown=self._is_friction_unknown(sources),
             **dependence.fields(self._ends, NARROW),
         )
 

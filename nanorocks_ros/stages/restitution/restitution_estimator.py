@@ -308,6 +308,7 @@ class RestitutionEstimator(RestartingStage[RestitutionInput, CorEstimate]):
             Quality.INCONSISTENT: result.tension > _LARGEST_TENSION,
             Quality.ACCELERATED: result.accelerated,
             Quality.SPEED_DEPENDENT: result.speed_dependent,
+            Quality.FRICTION_UNKNOWN: result.friction_unknown,
             Quality.STICKING: self._sticking.first_merge_ns is not None,
         }
         return reduce(or_, [flag for flag, is_set in flags.items() if is_set], Quality(0))

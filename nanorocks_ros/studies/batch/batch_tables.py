@@ -58,6 +58,11 @@ _ENDS = {
     '_scatter': 'standard deviation of a cycle',
 }
 _UNKNOWN = 'unknown'
+_YES_OR_NO = {
+    'friction_unknown': 'whether beads count as smooth, since rebounds do not tell if they rub',
+    'speed_dependent': 'whether contacts at different speeds contradict a constant restitution',
+}
+_ANSWERS = {True: 'yes', False: 'no', None: None}
 # Of a value that is not known, and type of the array.
 _EMPTY: dict[Kind, tuple[Any, Any]] = {
     'string': (_UNKNOWN, np.str_),
@@ -120,11 +125,7 @@ def _in_words(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _tray_in_words(values: Mapping[str, Any]) -> dict[str, Any]:
-    dependent = values['speed_dependent']
-    return {
-        **values,
-        'speed_dependent': None if dependent is None else 'yes' if dependent else 'no',
-    }
+    return {**values, **{name: _ANSWERS[values[name]] for name in _YES_OR_NO}}
 
 
 def cycle_columns(size_unit: str) -> tuple[Column, ...]:
@@ -149,13 +150,9 @@ def _mean_column(name: str, size_unit: str) -> Column:
         return _TRAY
     if name in _WORDS:
         return _OF_COR.get(name) or _OF_CLUSTERS[name]
-    if name == 'speed_dependent':
-        return Column(
-            name=name,
-            kind='string',
-            doc='whether contacts at different speeds contradict a constant restitution',
-            words=('yes', 'no', _UNKNOWN),
-        )
+    if name in _YES_OR_NO:
+        words = 'yes', 'no', _UNKNOWN
+        return Column(name=name, kind='string', doc=_YES_OR_NO[name], words=words)
     quantity, doc = name.removeprefix('mean_'), ''
     if name in _COUNTS or name.endswith('_cycles'):
         return Column(name=name, kind='int64', unit='1', doc='number of these')

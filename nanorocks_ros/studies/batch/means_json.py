@@ -46,6 +46,7 @@ def means_as_json(tray: TrayMeans) -> dict[str, Any]:
         'headline': mean.headline.name.lower() if mean else None,
         'wall_friction': finite_or_none(mean.wall_friction.value) if mean else None,
         'wall_friction_error': finite_or_none(mean.wall_friction.error) if mean else None,
+        'friction_unknown': mean.friction_unknown if mean else None,
         'speed_dependent': mean.speed_dependent if mean else None,
         **_exponents_as_json(mean),
         'tension': finite_or_none(mean.tension) if mean else None,

@@ -9,7 +9,8 @@ import pytest
 from wall_rebounds import wall_rebounds
 
 from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
-from nanorocks_ros.inference.decay.friction_weights import friction_weights
+from nanorocks_ros.inference.decay.friction_weights import friction_weights, is_friction_told
+from nanorocks_ros.records import Measured
 from nanorocks_ros.settings import PriorSettings
 
 PRIOR = PriorSettings()
@@ -84,3 +85,27 @@ def test_a_friction_that_is_known_selects_its_likelihood():
     mixed = known.mixed(nodes, logs)
     assert mixed[0] == pytest.approx(0.0, abs=0.5)
     assert mixed[1] == pytest.approx(-20.0, abs=3.0)
+
+
+def test_the_friction_is_told_by_the_prior_or_by_enough_rebounds():
+    assert not is_friction_told(PRIOR, NONE.wall_friction)
+    assert is_friction_told(TOLD, NONE.wall_friction)
+    assert is_friction_told(PRIOR, sliding(0.0).wall_friction)
+    assert is_friction_told(PRIOR, sliding(0.02).wall_friction)
+
+
+@pytest.mark.parametrize(
+    ('shown', 'told'),
+    [
+        (Measured(0.007, 0.03), False),
+        (Measured(0.09, 0.085), False),
+        (Measured(0.09, 0.03), True),
+        (Measured(0.004, 0.007), True),
+        # Far below 0 by chance, few rebounds exclude less than they seem to.
+        (Measured(-0.02, 0.015), False),
+        (Measured(-0.02, 0.008), True),
+        (Measured(-1.0, 0.001), True),
+    ],
+)
+def test_a_friction_is_told_where_rebounds_exclude_a_strong_one_or_show_one(shown, told):
+    assert is_friction_told(PRIOR, shown) == told

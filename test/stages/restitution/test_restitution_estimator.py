@@ -29,6 +29,7 @@ from nanorocks_ros.records import (
 )
 from nanorocks_ros.settings import PipelineSettings, SimulationSettings, with_values
 from nanorocks_ros.simulation.ensemble import cooling_runs
+from nanorocks_ros.stages.restitution.decay_library_method import DecayLibraryMethod
 from nanorocks_ros.stages.restitution.restitution_estimator import RestitutionEstimator
 
 NS = 1_000_000_000
@@ -37,6 +38,8 @@ TRAY = load_trays()[1]
 
 # A live estimate every 5 s: each takes as long as the final one.
 SELDOM = {'cooling.update_interval': 5.0}
+# A setting that tells that beads hardly rub, for cycles without rebounds.
+SMOOTH = {'prior.friction': 0.001}
 
 
 def fitter(**values):
@@ -230,12 +233,12 @@ def test_a_decay_that_tells_too_little_says_so():
 def test_what_was_wrong_with_the_pictures_goes_with_the_estimate():
     speeds = simulated_cycle()
     speeds[60] = replace(speeds[60], quality=Quality.GLARE)
-    *_, final = all_estimates(fitter(), speeds)
+    *_, final = all_estimates(fitter(**SMOOTH), speeds)
     assert final.quality is Quality.GLARE
 
 
 def test_a_flag_that_comes_after_the_last_speed_is_on_the_final_estimate_of_its_cycle_alone():
-    stage = fitter()
+    stage = fitter(**SMOOTH)
     # Shorter than the window: the end of the recording ends the cycle.
     all_estimates(stage, simulated_cycle()[:100])
     stage.flag_cycle(Quality.DOUBTFUL_SCALE)
@@ -462,6 +465,22 @@ def test_rebounds_that_the_decay_cannot_go_with_are_flagged():
     assert final.quality & Quality.INCONSISTENT
 
 
+def test_a_friction_that_neither_rebounds_nor_a_setting_tell_is_flagged():
+    speeds = simulated_cycle()
+    seen = list(wall_rebounds(np.random.default_rng(1), 40, 2.0, 17.0))
+    stage, method = fitter(), DecayLibraryMethod(PipelineSettings(), TRAY)
+    *_, without = all_estimates(stage, speeds)
+    assert without.quality == Quality.FRICTION_UNKNOWN
+    assert method.mean_of(stage.evidence).quality == Quality.FRICTION_UNKNOWN
+    *_, few = all_estimates(fitter(), by_stamp([*speeds, *seen[:2]]))
+    assert (few.rebounds, few.quality) == (2, Quality.FRICTION_UNKNOWN)
+    *_, many = all_estimates(stage, by_stamp([*speeds, *seen]))
+    assert not many.quality
+    assert not method.mean_of(stage.evidence).quality
+    *_, told = all_estimates(fitter(**SMOOTH), speeds)
+    assert not told.quality
+
+
 def test_walls_whose_restitution_depends_on_speed_are_flagged():
     rng = np.random.default_rng(1)
     seen = wall_rebounds(
@@ -585,7 +604,7 @@ def test_the_decay_ends_with_the_first_merge():
     assert final.onset == pytest.approx(12.05)
     assert (final.window_end, final.samples) == (cut.window_end, cut.samples)
     assert final.decay_restitution == cut.decay_restitution
-    assert final.quality == Quality.STICKING
+    assert final.quality == Quality.STICKING | Quality.FRICTION_UNKNOWN
     *_, later = all_estimates(fitter(**{'cooling.until_merge': False}), [*speeds, merge(12.05)])
     assert later.window_end == pytest.approx(20.0, abs=0.11)
     assert math.isnan(later.onset)
