@@ -131,8 +131,8 @@ FLAGS = {
         'give the frames the times at which they were taken, or film again without losses',
     ),
     Quality.FRICTION_UNKNOWN: Words(
-        'rebounds do not tell whether the beads rub, so that they count as smooth; the '
-        'restitutions come out too low if they rub',
+        'beads count as smooth, since rebounds do not tell whether they rub; if they do, the '
+        'restitutions come out too low',
         'measure the friction with spare beads and set --prior-friction and '
         '--prior-friction-error; or film more cycles, or closer, so that more rebounds are seen',
     ),
