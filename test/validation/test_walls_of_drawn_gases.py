@@ -48,7 +48,7 @@ def test_rebounds_show_the_share_of_friction_that_all_cycles_show(case):
     if not friction:
         assert np.isnan(together).all()
         return
-    # 40 cycles of each friction and drag showed 0.80 to 0.96.
+    # 80 cycles of each friction and drag up to a friction of 0.03 showed 0.89 to 1.02.
     possible = SHOWN[together > together.max() - 2.0]
-    assert possible[0] < 0.96
-    assert possible[-1] > 0.80
+    assert possible[0] < 1.02
+    assert possible[-1] > 0.89
