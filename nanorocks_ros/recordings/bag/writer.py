@@ -3,7 +3,8 @@
 Messages are written in chunks that are compressed separately, so that viewers can seek. If the
 process is killed, the open chunk is lost: at most one second of recorded time or 1 MiB, whichever
 is less, and the last message; `flush` closes the chunk earlier. A killed recording has neither
-index nor ``metadata.yaml``; `reader.open_bag` can still read it. Only `sync` forces data to the
+index nor ``metadata.yaml``; `reader.open_bag` can still read it. Ctrl-C waits for the end of each
+write. Only `sync` forces data to the
 disk: otherwise a power cut loses what the operating system has not written yet.
 """
 
@@ -24,6 +25,7 @@ from rosbags.serde import SerdeError
 from nanorocks_ros.errors import RecordingError, UnwritableError
 from nanorocks_ros.recordings.bag.connections import add_connection
 from nanorocks_ros.recordings.bag.metadata_writer import MetadataWriter
+from nanorocks_ros.recordings.bag.uninterrupted import uninterrupted
 from nanorocks_ros.recordings.mcap.mcap_checksum import add_summary_checksum
 from nanorocks_ros.recordings.messages.message_types import standard_types
 from nanorocks_ros.records import NS
@@ -117,8 +119,9 @@ class BagWriter:
         trace: TracebackType | None,
     ) -> Literal[False]:
         try:
-            self._writer.close()
-            add_summary_checksum(self._storage.path)
+            with uninterrupted():
+                self._writer.close()
+                add_summary_checksum(self._storage.path)
         except OSError as failure:
             with suppress(OSError):
                 self._writer.abort()
@@ -182,9 +185,10 @@ class BagWriter:
     def flush(self) -> None:
         """Pass all written messages to the operating system: they survive a killed process."""
         try:
-            if self._storage.chunk.bio.tell():
-                self._storage.close_chunk()
-            self._storage.bio.flush()
+            with uninterrupted():
+                if self._storage.chunk.bio.tell():
+                    self._storage.close_chunk()
+                self._storage.bio.flush()
         except OSError as error:
             raise self._unwritable(error) from error
 
@@ -219,7 +223,8 @@ class BagWriter:
                 'give stamps of 0 or more',
             )
         try:
-            self._writer.write(connection, stamp_ns, cdr)
+            with uninterrupted():
+                self._writer.write(connection, stamp_ns, cdr)
         except OSError as error:
             raise self._unwritable(error) from error
         if stamp_ns - self._storage.chunk.message_start_time >= _CHUNK_NS:
@@ -236,8 +241,9 @@ class BagWriter:
                 f"topic '{topic}' was not declared ({', '.join(sorted(self._topics))})",
                 'add it to the topics of the writer',
             )
-        connection = add_connection(self._writer, self._store, topic, offered)
-        self._connections[topic] = connection
+        with uninterrupted():
+            connection = add_connection(self._writer, self._store, topic, offered)
+            self._connections[topic] = connection
         return connection
 
     def _too_late(self, topic: str) -> RecordingError:
