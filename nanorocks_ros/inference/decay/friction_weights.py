@@ -19,13 +19,13 @@ from scipy.special import log_ndtr, ndtri_exp
 from nanorocks_ros.inference.decay.friction_terms import HIGHEST_FRICTION
 from nanorocks_ros.numerics.log_sums import log_sum
 from nanorocks_ros.records import walls_rub
+from nanorocks_ros.settings import PriorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nanorocks_ros.inference.contacts.contact_terms import ContactTerms
     from nanorocks_ros.records import Measured
-    from nanorocks_ros.settings import PriorSettings
 
 _FRICTION = HIGHEST_FRICTION * np.linspace(0.0, 1.0, 61) ** 2
 _SHARE_SHOWN, _ROLLING, _SHARES = (0.6, 1.1), 0.05, 14
@@ -107,16 +107,20 @@ def friction_weights(prior: PriorSettings, contacts: ContactTerms) -> FrictionWe
 
 
 def is_friction_told(prior: PriorSettings, shown: Measured) -> bool:
-    """Whether a setting tells the friction, or rebounds tell a strong one from none.
+    """Whether the prior tells the friction, or rebounds tell a strong one from none.
+
+    The prior does with a friction above 0, or with a smaller error than the default: then 0 was
+    measured. Rebounds do where they show friction, or where the 95 % interval of what they show
+    ends below what they show of a friction of 0.1 at the least.
 
     Parameters
     ----------
     prior : PriorSettings
     shown : Measured
-        Friction of the side walls by rebounds; they do where it is above 0, or where what they
-        show of a friction of 0.1 at least is above the upper end of its interval of 95 %.
+        Friction of the side walls by rebounds.
     """
-    if prior.friction > 0.0 or walls_rub(shown):
+    by_prior = prior.friction > 0.0 or prior.friction_error < PriorSettings().friction_error
+    if by_prior or walls_rub(shown):
         return True
     if not shown.known:
         return False

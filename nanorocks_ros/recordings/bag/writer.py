@@ -4,8 +4,8 @@ Messages are written in chunks that are compressed separately, so that viewers c
 process is killed, the open chunk is lost: at most one second of recorded time or 1 MiB, whichever
 is less, and the last message; `flush` closes the chunk earlier. A killed recording has neither
 index nor ``metadata.yaml``; `reader.open_bag` can still read it. Ctrl-C waits for the end of each
-write. Only `sync` forces data to the
-disk: otherwise a power cut loses what the operating system has not written yet.
+write. Only `sync` forces data to the disk: otherwise a power cut loses what the operating system
+has not written yet.
 """
 
 from __future__ import annotations

@@ -90,6 +90,8 @@ def test_a_friction_that_is_known_selects_its_likelihood():
 def test_the_friction_is_told_by_the_prior_or_by_enough_rebounds():
     assert not is_friction_told(PRIOR, NONE.wall_friction)
     assert is_friction_told(TOLD, NONE.wall_friction)
+    # Spare beads were found to be smooth.
+    assert is_friction_told(replace(PRIOR, friction_error=0.001), NONE.wall_friction)
     assert is_friction_told(PRIOR, sliding(0.0).wall_friction)
     assert is_friction_told(PRIOR, sliding(0.02).wall_friction)
 
