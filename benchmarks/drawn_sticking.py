@@ -1,12 +1,13 @@
 """Films of drawn cameras in which beads stick: restitutions, sticking speed and onset.
 
 Films of trays and cameras that are drawn (`drawn_films`), each with sticking speeds of 1, 3 and 10
-mm/s and without; bodies turn. ``NANOROCKS_FILM_COUNT`` is the number of films a row, 8 by default.
-"Unflagged" films have one cycle, and no flag but that beads stick; all columns behind are those of
-them. "Holds" is the share of 95 % intervals with the truth, those from 0 to 1 among them, and
-one-sided ones of the sticking speed. Onsets are first merges since the kick. "From the true
-merges" are the sticking speeds that these and the true speeds of the same films would give: what
-is wrong there is the theory of the rates.
+mm/s and without, and two of them in a gas that slows the beads; bodies turn.
+``NANOROCKS_FILM_COUNT`` is the number of films a row, 8 by default. "Unflagged" films have one
+cycle, and no flag but that beads stick; all columns behind are those of them. "Holds" is the share
+of 95 % intervals with the truth, those from 0 to 1 among them, and one-sided ones of the sticking
+speed. Onsets are first merges since the kick. "From the true merges" are the sticking speeds that
+these and the true speeds of the same films would give: what is wrong there is the theory of the
+rates.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     from nanorocks_ros.records import ClusterEstimate
 
 _TRAYS = (1, 3)
-_STICKING = (0.0, 1e-3, 3e-3, 10e-3)
+# Sticking speeds [m/s] and drag [1/s].
+_GASES = ((0.0, 0.0), (1e-3, 0.0), (3e-3, 0.0), (10e-3, 0.0), (1e-3, 0.07), (3e-3, 0.07))
 _FILMS = 8
 # Between the true speeds that count, [s].
 _EVERY = 0.1
@@ -50,18 +52,19 @@ _HEADER = (
 def report() -> None:
     """Make missing films, measure in all, and print the table."""
     rows = {
-        (tray, sticking): partial(_film, tray, sticking)
+        (tray, sticking, drag): partial(_film, tray, sticking, drag)
         for tray in _TRAYS
-        for sticking in _STICKING
+        for sticking, drag in _GASES
     }
     print(_HEADER)
-    for (tray, sticking), read in measured_rows(rows, _FILMS):
+    for (tray, sticking, drag), read in measured_rows(rows, _FILMS):
         name = f'{tray}, {1e3 * sticking:g} mm/s' if sticking else f'{tray}, never'
+        name += f', drag {drag:g} /s' if drag else ''
         print(f'| {name} | {_cells(read)} |', flush=True)
 
 
-def _film(tray: int, sticking: float, number: int) -> DrawnFilm:
-    return DrawnFilm(tray=tray, number=number, sticking=sticking)
+def _film(tray: int, sticking: float, drag: float, number: int) -> DrawnFilm:
+    return DrawnFilm(tray=tray, number=number, sticking=sticking, drag=drag)
 
 
 def _cells(read: Sequence[ReadFilm]) -> str:

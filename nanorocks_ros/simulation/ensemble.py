@@ -21,7 +21,6 @@ from nanorocks_ros.simulation.engine.gas_state import COUNTS, DONE, PAIR, WALL, 
 from nanorocks_ros.simulation.engine.input_checks import (
     check_room,
     check_times,
-    refuse_turning_in_drag,
 )
 from nanorocks_ros.simulation.engine.kernel_choice import MOST_FOR_SCAN
 from nanorocks_ros.simulation.engine.rules.collision_rules import restitution_table
@@ -153,8 +152,6 @@ def _small_run(
     n_species = int(drawn.species.max()) + 1
     rules = rules._replace(restitution=restitution_table(rules.restitution, n_species))
     check_room(0.5 * drawn.diameter_high, rules)
-    if settings.drag > 0.0:
-        refuse_turning_in_drag(rules.rotating)
     purposes = (Purpose.DIAMETERS, Purpose.POSITIONS, Purpose.VELOCITIES)
     keys = np.array([key_for(settings.seed, run, purpose) for purpose in purposes])
     ranges = np.stack((drawn.diameter_low, drawn.diameter_high, drawn.density))

@@ -218,22 +218,26 @@ def test_beads_of_bodies_that_turn_are_where_the_bodies_put_them_in_every_frame(
     assert gas.counts.merge == TRAY.count - np.unique(gas.bodies).size
 
 
-def test_translating_bodies_can_be_chosen_and_rough_or_dragged_beads_need_them():
-    sticky = SimulationSettings(first_shake=0.0, sticking_speed=0.003)
-    for rule in ({'drag': 0.07}, {'tangential_restitution': 0.5}):
-        with pytest.raises(SimulationError, match='set aggregate_motion to translating'):
-            ShakenTray(replace(sticky, **rule), TRAY)
-        with pytest.raises(SimulationError, match='set aggregate_motion to translating'):
-            cooling_runs(replace(sticky, **rule), TRAY, [1.0], [0])
-        apart = ShakenTray(replace(sticky, **rule, aggregate_motion='translating'), TRAY)
-        apart.at(3.0)
-        assert apart.counts.merge > 0
+def test_translating_bodies_can_be_chosen_and_rough_beads_need_them():
+    sticky = SimulationSettings(first_shake=0.0, sticking_speed=0.003, tangential_restitution=0.5)
+    with pytest.raises(SimulationError, match='set aggregate_motion to translating'):
+        ShakenTray(sticky, TRAY)
+    with pytest.raises(SimulationError, match='set aggregate_motion to translating'):
+        cooling_runs(sticky, TRAY, [1.0], [0])
+    apart = ShakenTray(replace(sticky, aggregate_motion='translating'), TRAY)
+    apart.at(3.0)
+    assert apart.counts.merge > 0
 
 
-def test_the_bodies_of_an_ensemble_are_those_of_the_trays():
+@pytest.mark.parametrize('drag', [0.0, 0.07])
+def test_the_bodies_of_an_ensemble_are_those_of_the_trays(drag):
     """Many runs in one kernel and single ones frame by frame: the same, with turning bodies."""
     settings = SimulationSettings(
-        first_shake=0.0, sticking_speed=0.003, sticking_speed_width=0.004, break_up_speed=0.006
+        first_shake=0.0,
+        drag=drag,
+        sticking_speed=0.003,
+        sticking_speed_width=0.004,
+        break_up_speed=0.006,
     )
     times = [1.0, 5.0, 20.0]
     runs = cooling_runs(settings, TRAY, times, range(3))

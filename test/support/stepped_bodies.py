@@ -19,39 +19,49 @@ class _Body:
     turn: np.ndarray
     velocity: np.ndarray
     moment: np.ndarray
+    # Force per velocity of each bead, and torque per angular velocity about its own centre.
+    friction: np.ndarray
+    twist: np.ndarray
 
-    def spin(self, turn):
-        return turn @ np.linalg.solve(self.inertia, turn.T @ self.moment)
+    def spin(self, turn, moment):
+        return turn @ np.linalg.solve(self.inertia, turn.T @ moment)
 
     def moved(self, step):
-        """Centre and orientation after a step, by Runge and Kutta's method of order 4."""
-        centre = self.centre + step * self.velocity
-        if not self.moment.any():
-            return centre, self.turn
+        """Centre, orientation, velocity and angular momentum after a step, by Runge and Kutta."""
+        start = np.concatenate([self.centre, self.velocity, self.moment, self.turn.ravel()])
 
-        def slope(turn):
-            x, y, z = self.spin(turn)
-            return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ turn
+        def slope(state):
+            velocity, moment, turn = state[3:6], state[6:9], state[9:].reshape(3, 3)
+            x, y, z = spin = self.spin(turn, moment)
+            arms = self.arms @ turn.T
+            forces = -self.friction[:, np.newaxis] * (velocity + np.cross(spin, arms))
+            torque = np.cross(arms, forces).sum(axis=0) - self.twist.sum() * spin
+            turning = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ turn
+            change = velocity, forces.sum(axis=0) / self.mass, torque, turning.ravel()
+            return np.concatenate(change)
 
-        k1 = slope(self.turn)
-        k2 = slope(self.turn + 0.5 * step * k1)
-        k3 = slope(self.turn + 0.5 * step * k2)
-        k4 = slope(self.turn + step * k3)
-        turned = self.turn + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        k1 = slope(start)
+        k2 = slope(start + 0.5 * step * k1)
+        k3 = slope(start + 0.5 * step * k2)
+        k4 = slope(start + step * k3)
+        end = start + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         # Nearest rotation, by one step of Newton's method.
-        turned = 1.5 * turned - 0.5 * turned @ turned.T @ turned
-        return centre, turned
+        turn = end[9:].reshape(3, 3)
+        turn = 1.5 * turn - 0.5 * turn @ turn.T @ turn
+        return end[:3], turn, end[3:6], end[6:9]
 
 
 class SteppedBodies:
     """Beads in a box that bounce, stick below a normal speed, and then turn as rigid bodies.
 
-    Single beads are smooth. `events` lists time, kind, bead and partner as the engine does.
+    Single beads are smooth. `events` lists time, kind, bead and partner as the engine does. The
+    gas pulls at every bead by Stokes' law, as if the others were not there.
     """
 
     def __init__(self, beads, box, *, restitution, walls, sticking):
         self.radii, self.masses, self.box = beads.radii, beads.masses, np.array(box)
         self.restitution, self.walls, self.sticking = restitution, walls, sticking
+        self.rates = np.zeros(len(self.radii)) if beads.drag is None else np.asarray(beads.drag)
         self.bodies = [
             self._body([i], x[np.newaxis], v, np.zeros(3))
             for i, (x, v) in enumerate(zip(beads.positions, beads.velocities, strict=True))
@@ -67,7 +77,21 @@ class SteppedBodies:
         for mass, radius, arm in zip(masses, self.radii[beads], arms, strict=True):
             inertia += (0.4 * mass * radius**2 + mass * arm @ arm) * np.eye(3)
             inertia -= mass * np.outer(arm, arm)
-        return _Body(beads, arms, inertia, masses.sum(), centre, np.eye(3), velocity, moment)
+        friction = self.rates[beads] * masses
+        # 8 pi eta r^3 for 6 pi eta r; a single bead does not spin.
+        twist = 4.0 / 3.0 * friction * self.radii[beads] ** 2
+        return _Body(
+            beads,
+            arms,
+            inertia,
+            masses.sum(),
+            centre,
+            np.eye(3),
+            velocity,
+            moment,
+            friction,
+            twist,
+        )
 
     def follow(self, end, step):
         """Follow the gas to a time in steps of at most this length."""
@@ -77,11 +101,10 @@ class SteppedBodies:
     def places_and_velocities(self, after=0.0):
         x, v = np.empty((2, len(self.radii), 3))
         for body in self.bodies:
-            centre, turn = body.moved(after)
+            centre, turn, velocity, moment = body.moved(after)
             arms = body.arms @ turn.T
-            x[body.beads], v[body.beads] = centre + arms, body.velocity
-            if body.moment.any():
-                v[body.beads] += np.cross(body.spin(turn), arms)
+            x[body.beads] = centre + arms
+            v[body.beads] = velocity + np.cross(body.spin(turn, moment), arms)
         return x, v
 
     def labels(self):
@@ -92,7 +115,7 @@ class SteppedBodies:
 
     def _advance(self, step):
         for body in self.bodies:
-            body.centre, body.turn = body.moved(step)
+            body.centre, body.turn, body.velocity, body.moment = body.moved(step)
         self.time += step
 
     def _step(self, length):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Incremented with every change of the fields of a state.
-_FORM = 4
+_FORM = 5
 _DIGEST = 'sha256'
 # What zipfile and numpy raise for damaged files and files of other formats.
 _DAMAGE = (

@@ -13,13 +13,8 @@ import numpy as np
 from nanorocks_ros.numerics.compiled import inlined
 from nanorocks_ros.simulation.engine.collision.wall_collisions import next_wall_event
 from nanorocks_ros.simulation.engine.event_queue import schedule
-from nanorocks_ros.simulation.engine.flight.gas_drag import (
-    drag_rate,
-    flight_time,
-    is_dragged,
-    position_at,
-    velocity_at,
-)
+from nanorocks_ros.simulation.engine.flight.drag_rates import drag_rate, is_dragged
+from nanorocks_ros.simulation.engine.flight.gas_drag import flight_time, position_at, velocity_at
 from nanorocks_ros.simulation.engine.flight.pair_times import square_of, wait_for_contact
 from nanorocks_ros.simulation.engine.flight.turning_contacts import (
     end_of_stretch,

@@ -284,7 +284,7 @@ class HardSphereGas(GasView):
         n = checked[0].size
         species = check_species(beads.species, n, self._known_species)
         spins = check_spins(beads.spins, n, self._rules.rough)
-        drag = check_drag(beads.drag, n, self._rules.rotating)
+        drag = check_drag(beads.drag, n)
         n_species = max(int(species.max()) + 1, self._known_species)
         rules = self._rules._replace(
             restitution=restitution_table(self._rules.restitution, n_species)

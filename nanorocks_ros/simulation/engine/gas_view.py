@@ -12,7 +12,7 @@ import numpy as np
 from nanorocks_ros.simulation.engine.beads import Beads
 from nanorocks_ros.simulation.engine.event_counts import EventCounts
 from nanorocks_ros.simulation.engine.event_loop import snapshot
-from nanorocks_ros.simulation.engine.flight.gas_drag import OWN_RATE
+from nanorocks_ros.simulation.engine.flight.drag_rates import OWN_RATE
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     EPOCH,

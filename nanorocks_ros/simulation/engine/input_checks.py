@@ -97,11 +97,8 @@ def check_spins(spins: ArrayLike | None, n: int, rough: bool) -> NDArray[np.floa
     return numbers
 
 
-def check_drag(drag: ArrayLike | None, n: int, rotating: bool) -> NDArray[np.float64]:
-    """Decay rates of each bead and of its body, (n, 2); (0,) where none is above 0.
-
-    Refused for bodies that turn.
-    """
+def check_drag(drag: ArrayLike | None, n: int) -> NDArray[np.float64]:
+    """Decay rates of each bead and of its body, (n, 2); (0,) where none is above 0."""
     if drag is None:
         return np.zeros(0)
     rates = _finite('drag', drag, (n,))
@@ -112,23 +109,7 @@ def check_drag(drag: ArrayLike | None, n: int, rotating: bool) -> NDArray[np.flo
         )
     if not rates.any():
         return np.zeros(0)
-    refuse_turning_in_drag(rotating)
     return np.stack((rates, rates), axis=1)
-
-
-def refuse_turning_in_drag(rotating: bool) -> None:
-    """Refuse bodies that turn in a gas that slows them.
-
-    Raises
-    ------
-    SimulationError
-    """
-    if rotating:
-        raise SimulationError(
-            'drag',
-            'bodies that turn fly without drag',
-            'set aggregate_motion to translating, or drag to 0',
-        )
 
 
 def check_room(radii: NDArray[np.float64], rules: Rules) -> None:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.simulation.engine.flight.drag_rates import is_dragged, set_body_drag
 from nanorocks_ros.simulation.engine.flight.gas_drag import (
+    flight_in_gas,
     flown_time,
-    is_dragged,
     joined_drag_rate,
-    set_body_drag,
     speed_left,
     spin_left,
 )
@@ -42,6 +42,13 @@ if TYPE_CHECKING:
 def advance(state: State, i: int, now: float) -> None:
     """Move a bead in free flight to a time."""
     rows = state.rows
+    if is_turning(state) and is_dragged(state):
+        place, velocity = flight_in_gas(state, i, now)
+        for axis in range(3):
+            rows[i, X + axis] = place[axis]
+            rows[i, VX + axis] = velocity[axis]
+        rows[i, TIME] = now
+        return
     if is_turning(state) and turns(state, i):
         place, velocity, _ = turned_bead(state, i, now)
         for axis in range(3):

@@ -26,12 +26,12 @@ from nanorocks_ros.simulation.engine.collision.contact_laws import (
     sticking_threshold,
 )
 from nanorocks_ros.simulation.engine.collision.friction import apply_pair_friction
-from nanorocks_ros.simulation.engine.collision.rigid_bodies import velocity_of_body
+from nanorocks_ros.simulation.engine.collision.rigid_bodies import count_from, velocity_of_body
 from nanorocks_ros.simulation.engine.collision.rigid_collisions import (
     collide_rigid_bodies,
     merge_rigid_bodies,
 )
-from nanorocks_ros.simulation.engine.flight.gas_drag import is_dragged
+from nanorocks_ros.simulation.engine.flight.drag_rates import is_dragged
 from nanorocks_ros.simulation.engine.flight.pair_times import (
     is_rounding,
     minimum_image,
@@ -109,6 +109,8 @@ def merge(state: State, rules: Rules, i: int, j: int, now: float) -> int:
     if is_turning(state):
         advance_body(state, i, now)
         advance_body(state, j, now)
+        count_from(state, i, now)
+        count_from(state, j, now)
     if free_i:
         book_merging_body(state, rules, i, stuck, now)
     if free_j:

@@ -16,7 +16,12 @@ from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
     add_vector,
     energy_of,
 )
-from nanorocks_ros.simulation.engine.collision.rigid_bodies import set_fragment
+from nanorocks_ros.simulation.engine.collision.rigid_bodies import count_from, set_fragment
+from nanorocks_ros.simulation.engine.flight.drag_rates import (
+    is_dragged,
+    own_rate,
+    set_body_drag,
+)
 from nanorocks_ros.simulation.engine.flight.turning_motion import (
     angular_velocity,
     body_of,
@@ -75,6 +80,8 @@ def _separate(state: State, first: int, last: int) -> None:
         state.bodies[i, BODY] = number
         state.bodies[i, FOLLOWING] = i
         state.masses[number, OF_BODY] = state.masses[i, OWN]
+        if is_dragged(state):
+            set_body_drag(state, i, own_rate(state, i))
 
 
 @inlined
@@ -114,7 +121,8 @@ def release_bead(state: State, rules: Rules, i: int, now: float, first: int, las
     """
     advance_body(state, i, now)
     body = body_of(state, i)
-    spin = angular_velocity(state, body, orientation(state, body, now))
+    spin = angular_velocity(state, body, orientation(state, body, now), now)
+    count_from(state, i, now)
     before = energy_of(state, rules, i)
     _remove_bonds(state, i)
     _separate(state, first, last)

@@ -12,7 +12,7 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled
 from nanorocks_ros.numerics.exponentials import decay_time, decayed
-from nanorocks_ros.simulation.engine.flight.gas_drag import flown
+from nanorocks_ros.simulation.engine.flight.drag_rates import flown
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.rules.collision_rules import Rules

@@ -8,7 +8,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.numerics.compiled import inlined, kernel
+from nanorocks_ros.numerics.compiled import inlined, kernel, kernel_where
+from nanorocks_ros.physics.stokes_drag import TURNING_PER_MOVING
+from nanorocks_ros.simulation.engine.flight.drag_rates import (
+    drag_rate,
+    is_dragged,
+    own_rate,
+    turns_in_gas,
+)
 from nanorocks_ros.simulation.engine.flight.rotation_series import expand, rebase
 from nanorocks_ros.simulation.engine.flight.turning_motion import (
     ARM,
@@ -16,7 +23,9 @@ from nanorocks_ros.simulation.engine.flight.turning_motion import (
     FROM,
     INVERSE,
     MOMENT,
+    RATE,
     SERIES,
+    TORQUE,
     VELOCITY,
     arm_now,
     body_of,
@@ -52,7 +61,10 @@ if TYPE_CHECKING:
 
 @inlined
 def velocity_of_body(state: State, i: int) -> Vector:
-    """Velocity of the centre of mass of the body of a bead, [m/s]."""
+    """Velocity of the centre of mass of the body of a bead, [m/s].
+
+    Where the gas slows bodies, that at the beginning of its motion: `count_from` comes before.
+    """
     if is_turning(state) and turns(state, i):
         return motion_vector(state, body_of(state, i), VELOCITY)
     rows = state.rows
@@ -114,6 +126,34 @@ def _set_inverse_inertia(state: State, i: int) -> None:
 
 
 @inlined
+def _set_drag(state: State, i: int) -> None:
+    """Set the rate of the velocity of a body, and its torque per angular velocity.
+
+    The forces on its beads add up, as if they were far apart, and each has the torque of a bead
+    that turns about its own centre.
+    """
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    k = i
+    while True:
+        per, radius = own_rate(state, k) * state.masses[k, OWN], state.rows[k, RADIUS]
+        x, y, z = motion_vector(state, k, ARM)
+        own = TURNING_PER_MOVING * INERTIA * per * radius * radius
+        xx += own + per * (y * y + z * z)
+        yy += own + per * (x * x + z * z)
+        zz += own + per * (x * x + y * y)
+        xy -= per * x * y
+        xz -= per * x * z
+        yz -= per * y * z
+        k = as_int64(state.bodies[k, FOLLOWING])
+        if k == i:
+            break
+    body = body_of(state, i)
+    set_motion(state, body, RATE, drag_rate(state, i))
+    set_motion_vector(state, body, TORQUE, (xx, yy, zz))
+    set_motion_vector(state, body, TORQUE + 3, (xy, xz, yz))
+
+
+@inlined
 def _set_arms(state: State, i: int, centre: Vector) -> None:
     """Set the arms of the beads of a body from their rows, along the axes of space."""
     k = i
@@ -143,6 +183,8 @@ def set_rigid_body(
     body = body_of(state, i)
     _set_arms(state, i, centre)
     _set_inverse_inertia(state, i)
+    if is_dragged(state):
+        _set_drag(state, i)
     set_motion(state, body, FROM, now)
     set_motion_vector(state, body, CENTRE, centre)
     set_motion_vector(state, body, VELOCITY, velocity)
@@ -232,6 +274,19 @@ def start_impact(state: State, i: int, now: float) -> None:
     """Count the motion of the body of a bead from now on, if it turns; `push` must follow."""
     if turns(state, i):
         rebase(state, body_of(state, i), now)
+
+
+@kernel_where(turns_in_gas, 0)
+def count_from(state: State, i: int, now: float) -> int:
+    """Count the motion of a body that the gas slows from now on: it is about to end or to merge.
+
+    Returns
+    -------
+    int
+        Nothing: 0.
+    """
+    start_impact(state, i, now)
+    return 0
 
 
 @inlined

@@ -21,6 +21,7 @@ from nanorocks_ros.simulation.engine.collision.conservation_ledger import (
 )
 from nanorocks_ros.simulation.engine.collision.rigid_bodies import (
     centre_of_body,
+    count_from,
     inverse_mass_along,
     moment_of_body,
     push,
@@ -80,6 +81,8 @@ def merge_rigid_bodies(
     """
     marked = mark_changed_body(state, j, mark_changed_body(state, i, 0))
     advance_marked(state, marked, now)
+    count_from(state, i, now)
+    count_from(state, j, now)
     before = energy_of(state, rules, i) + energy_of(state, rules, j)
     a, b = state.masses[body_of(state, i), OF_BODY], state.masses[body_of(state, j), OF_BODY]
     share, reduced = b / (a + b), a * b / (a + b)
@@ -129,13 +132,13 @@ def mark_and_release(
 
 
 @inlined
-def least_separation(state: State, rules: Rules, i: int) -> float:
+def least_separation(state: State, rules: Rules, i: int, now: float) -> float:
     """Speed at which a bead must leave a contact not to be back within a contact duration, [m/s].
 
     The rotation of its body can press it against what it has just left; without this, it would
     hit it without end at one instant. A contact that is slower than this is elastic.
     """
-    return 0.5 * largest_bend(state, i) * rules.contact_duration
+    return 0.5 * largest_bend(state, i, now) * rules.contact_duration
 
 
 @where_turning(0)
@@ -164,7 +167,7 @@ def collide_rigid_bodies(
         rows[j, X + 2] - rows[i, X + 2],
     )
     normal = scaled(apart, 1.0 / length(apart))
-    least = least_separation(state, rules, i) + least_separation(state, rules, j)
+    least = least_separation(state, rules, i, now) + least_separation(state, rules, j, now)
     after = max(-restitution * closing, min(least, -closing))
     start_impact(state, i, now)
     start_impact(state, j, now)
@@ -211,7 +214,7 @@ def push_off_wall(
     """
     before, after = speeds
     marked = mark_and_release(state, rules, i, now, abs(before), 0)
-    least = min(least_separation(state, rules, i), abs(before))
+    least = min(least_separation(state, rules, i, now), abs(before))
     if abs(after) < least:
         after = -least if before > 0.0 else least
     normal = 1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2)

@@ -64,13 +64,13 @@ def wait_for_wall(
     radius = state.rows[i, RADIUS]
     moving = rules.moving and rules.amplitude[axis] != 0.0
     epoch = state.clock[EPOCH]
-    bend = largest_bend(state, i)
+    bend = largest_bend(state, i, now)
     closed = CLOSED * radius
     surface = (rules.sides[axis] if wall % 2 else 0.0) - outward * radius
     room = outward * (surface - bead_at(state, i, now)[0][axis])
     if moving:
         room -= largest_excursion(rules, axis, epoch + now)
-    if room > largest_speed(state, i) * last:
+    if room > largest_speed(state, i, now) * last:
         return np.inf
     wait = 0.0
     for _ in range(MOST_STEPS):

@@ -32,16 +32,11 @@ from nanorocks_ros.simulation.engine.collision.moving_walls import (
     time_to_moving_wall,
     tray_displacement,
 )
-from nanorocks_ros.simulation.engine.collision.rigid_bodies import velocity_of_body
+from nanorocks_ros.simulation.engine.collision.rigid_bodies import count_from, velocity_of_body
 from nanorocks_ros.simulation.engine.collision.rigid_collisions import push_off_wall
 from nanorocks_ros.simulation.engine.collision.turning_walls import next_wall_of_turning
-from nanorocks_ros.simulation.engine.flight.gas_drag import (
-    drag_rate,
-    flight_time,
-    is_dragged,
-    position_at,
-    velocity_at,
-)
+from nanorocks_ros.simulation.engine.flight.drag_rates import drag_rate, is_dragged
+from nanorocks_ros.simulation.engine.flight.gas_drag import flight_time, position_at, velocity_at
 from nanorocks_ros.simulation.engine.flight.pair_times import speed_square
 from nanorocks_ros.simulation.engine.flight.turning_contacts import ROUNDING
 from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turns
@@ -151,6 +146,7 @@ def stick_to_wall(state: State, rules: Rules, i: int, wall: int, now: float) -> 
     rows = state.rows
     mass = mass_of(state, rules, i)
     outward = 1.0 if wall % 2 else -1.0
+    count_from(state, i, now)
     velocity = velocity_of_body(state, i)
     state.ledger[WALL_IMPULSE + wall] += outward * mass * velocity[wall // 2]
     state.ledger[WALL_LOSS] += energy_of(state, rules, i)

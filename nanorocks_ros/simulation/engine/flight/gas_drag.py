@@ -12,35 +12,24 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.numerics.compiled import inlined, kernel_where
 from nanorocks_ros.numerics.exponentials import decay_time, decayed
 from nanorocks_ros.physics.stokes_drag import TURNING_PER_MOVING
+from nanorocks_ros.simulation.engine.flight.drag_rates import (
+    drag_rate,
+    flown,
+    is_dragged,
+    turns_in_gas,
+)
 from nanorocks_ros.simulation.engine.flight.turning_motion import is_turning, turned_bead, turns
 from nanorocks_ros.simulation.engine.gas_state import TIME, VX, VY, VZ, X, Y, Z
+from nanorocks_ros.simulation.engine.vectors import scaled, sum_of
 
 if TYPE_CHECKING:
     from nanorocks_ros.simulation.engine.gas_state import State
+    from nanorocks_ros.simulation.engine.vectors import Vector
 
-_COLUMNS = 2
-OWN_RATE, _OF_BODY = range(_COLUMNS)
-
-
-@inlined
-def is_dragged(state: State) -> bool:
-    """Whether there is drag; a constant for the compiler, since it is in the type of the state."""
-    return bool(state.drag.ndim == _COLUMNS)
-
-
-@inlined
-def drag_rate(state: State, i: int) -> float:
-    """Decay rate of the velocity of the body of a bead, [1/s]; only with drag."""
-    return state.drag.flat[_COLUMNS * i + _OF_BODY]
-
-
-@inlined
-def set_body_drag(state: State, i: int, rate: float) -> None:
-    """Set the decay rate of the body of a bead; only with drag."""
-    state.drag.flat[_COLUMNS * i + _OF_BODY] = rate
+_NOTHING = 0.0, 0.0, 0.0
 
 
 @inlined
@@ -65,14 +54,6 @@ def flight_time(state: State, i: int, undragged: float) -> float:
 
 
 @inlined
-def flown(rate: float, since: float) -> float:
-    """Flown time of a decay rate, [s]."""
-    if rate > 0.0:
-        return decayed(rate * since)[0] / rate
-    return since
-
-
-@inlined
 def speed_left(state: State, i: int, since: float) -> float:
     """Part of the velocity of a bead that is left after a time."""
     if is_dragged(state):
@@ -88,9 +69,26 @@ def spin_left(state: State, i: int, since: float) -> float:
     return 1.0
 
 
+# What all other code calls, so that it is not compiled into each place: that would take twice as
+# long as without drag.
+@kernel_where(turns_in_gas, (_NOTHING, _NOTHING))
+def flight_in_gas(state: State, i: int, now: float) -> tuple[Vector, Vector]:
+    """Place and velocity of any bead where bodies turn and a gas slows them, [m], [m/s]."""
+    if turns(state, i):
+        place, velocity, _ = turned_bead(state, i, now)
+        return place, velocity
+    rows = state.rows
+    rate, since = drag_rate(state, i), now - rows[i, TIME]
+    velocity = rows[i, VX], rows[i, VY], rows[i, VZ]
+    place = sum_of((rows[i, X], rows[i, Y], rows[i, Z]), scaled(velocity, flown(rate, since)))
+    return place, scaled(velocity, decayed(rate * since)[1])
+
+
 @inlined
-def position_at(state: State, i: int, now: float) -> tuple[float, float, float]:
+def position_at(state: State, i: int, now: float) -> Vector:
     """Position of a bead at a time, [m]."""
+    if is_turning(state) and is_dragged(state):
+        return flight_in_gas(state, i, now)[0]
     if is_turning(state) and turns(state, i):
         return turned_bead(state, i, now)[0]
     rows = state.rows
@@ -103,8 +101,10 @@ def position_at(state: State, i: int, now: float) -> tuple[float, float, float]:
 
 
 @inlined
-def velocity_at(state: State, i: int, now: float) -> tuple[float, float, float]:
+def velocity_at(state: State, i: int, now: float) -> Vector:
     """Velocity of a bead at a time, [m/s]."""
+    if is_turning(state) and is_dragged(state):
+        return flight_in_gas(state, i, now)[1]
     if is_turning(state) and turns(state, i):
         return turned_bead(state, i, now)[1]
     rows = state.rows

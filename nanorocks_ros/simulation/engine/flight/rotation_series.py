@@ -8,6 +8,9 @@ gets a new one. This holds for bodies of any shape, needs only + - * /, and its 
 grow: angular momentum is a constant of the motion, and energy follows from it and the
 orientation.
 
+A gas at rest slows the rotation by a torque -D w, with a tensor D that is constant along the axes
+of the body: dM/dt = M × w - D w.
+
 Tested by ``test/simulation/engine/flight/test_turning_motion.py``.
 """
 
@@ -18,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined, kernel
+from nanorocks_ros.simulation.engine.flight.drag_rates import is_dragged
 from nanorocks_ros.simulation.engine.flight.turning_motion import (
     CENTRE,
     COLUMNS,
@@ -25,20 +29,26 @@ from nanorocks_ros.simulation.engine.flight.turning_motion import (
     MAX_BEND,
     MAX_SPIN,
     MOMENT,
+    MOMENTS,
     ORDER,
     SERIES,
+    TORQUE,
     UNTIL,
+    VELOCITY,
     body_of,
     centre_at,
     conjugate,
     motion,
     motion_vector,
     orientation,
+    own_moment,
     rotated,
     set_motion,
     set_motion_vector,
     times_inverse_inertia,
+    times_tensor,
     turn_power,
+    velocity_of_centre,
 )
 from nanorocks_ros.simulation.engine.vectors import cross, length
 
@@ -52,6 +62,8 @@ _NEGLIGIBLE = 1e-16
 # The bounds are sums of a finite series.
 _MARGIN = 1.0 + 1e-6
 _HALVINGS = 60
+# Angular velocity below which a body that the gas slows has come to rest, [rad/s].
+_AT_REST = 1e-30
 
 
 @inlined
@@ -76,6 +88,8 @@ def _store(state: State, body: int, power: int, moment: Vector) -> None:
     for axis in range(3):
         state.motions.flat[first + axis] = moment[axis]
         state.motions.flat[first + 3 + axis] = spin[axis]
+    if is_dragged(state):
+        set_motion_vector(state, body, MOMENTS + 3 * power, moment)
 
 
 @inlined
@@ -93,6 +107,9 @@ def _next_power(state: State, body: int, power: int) -> None:
         b += q[0] * spin[0] + side[0]
         c += q[0] * spin[1] + side[1]
         d += q[0] * spin[2] + side[2]
+    if is_dragged(state):
+        torque = times_tensor(state, body, TORQUE, _spin_of(state, power - 1))
+        x, y, z = x - torque[0], y - torque[1], z - torque[2]
     per = 1.0 / power
     _store(state, body, power, (x * per, y * per, z * per))
     first = COLUMNS * body + SERIES + 4 * power
@@ -113,6 +130,12 @@ def _stretch(state: State, body: int, spin: float) -> float:
     """Time for which the series is exact to rounding, at most one radian, [s]."""
     last, before = _size(turn_power(state, body, ORDER)), _size(turn_power(state, body, ORDER - 1))
     duration = 1.0 / spin
+    if is_dragged(state):
+        # A body that hardly turns any more loses its angular momentum as fast as before.
+        whole = length(_moment_of(state, 0))
+        last = max(last, length(_moment_of(state, ORDER)) / whole)
+        before = max(before, length(_moment_of(state, ORDER - 1)) / whole)
+        duration = 1.0 / max(spin, length(_moment_of(state, 1)) / whole)
     for _ in range(_HALVINGS):
         square = duration * duration
         fourth = square * square
@@ -137,6 +160,9 @@ def expand(state: State, body: int) -> None:
     turn = turn_power(state, body, 0)
     moment = rotated(conjugate(turn), motion_vector(state, body, MOMENT))
     _store(state, body, 0, moment)
+    if is_dragged(state) and length(_spin_of(state, 0)) < _AT_REST:
+        set_motion_vector(state, body, MOMENT, (0.0, 0.0, 0.0))
+        _store(state, body, 0, (0.0, 0.0, 0.0))
     spin = length(_spin_of(state, 0))
     for power in range(1, ORDER + 1):
         _next_power(state, body, power)
@@ -168,9 +194,14 @@ def rebase(state: State, body: int, now: float) -> None:
     now : float, [s]
         Within its stretch.
     """
-    a, b, c, d = orientation(state, body, now)
+    q = orientation(state, body, now)
+    a, b, c, d = q
     per = 1.0 / np.sqrt(a * a + b * b + c * c + d * d)
     set_motion_vector(state, body, CENTRE, centre_at(state, body, now))
+    if is_dragged(state):
+        set_motion_vector(state, body, VELOCITY, velocity_of_centre(state, body, now))
+        moment = rotated(q, own_moment(state, body, q, now))
+        set_motion_vector(state, body, MOMENT, moment)
     first = COLUMNS * body + SERIES
     series = state.motions.flat
     series[first] = a * per

@@ -2,9 +2,9 @@
 
 Their paths are bent, and contacts have no closed form. As with drag (`unequal_drag`), steps
 approach a contact that cannot pass it: the gap closes no faster than a parabola with the present
-gap and opening speed that bends as much as the bodies can accelerate their beads. Each search
-ends with the stretch of the motion of the bodies; what comes later is predicted when a body gets
-a new stretch.
+gap and opening speed that bends as much as the bodies, and the gas, can accelerate the beads. Each
+search ends with the stretch of the motion of the bodies; what comes later is predicted when a body
+gets a new stretch.
 
 Tested by ``test/simulation/engine/flight/test_turning_contacts.py``.
 """
@@ -17,19 +17,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined
+from nanorocks_ros.simulation.engine.flight.drag_rates import drag_rate, is_dragged
+from nanorocks_ros.simulation.engine.flight.gas_drag import flight_in_gas, flight_time
 from nanorocks_ros.simulation.engine.flight.pair_times import is_rounding
 from nanorocks_ros.simulation.engine.flight.turning_motion import (
     MAX_BEND,
     MAX_SPIN,
     UNTIL,
-    VELOCITY,
     arm_length,
     body_of,
     centre_of_bead,
     motion,
-    motion_vector,
     turned_bead,
     turns,
+    velocity_of_centre,
     where_turning,
 )
 from nanorocks_ros.simulation.engine.flight.unequal_drag import earliest_closing
@@ -68,7 +69,9 @@ LEAST_STEP = 2e-15
 
 @inlined
 def bead_at(state: State, i: int, now: float) -> tuple[Vector, Vector]:
-    """Place and velocity of any bead of a gas without drag, [m], [m/s]."""
+    """Place and velocity of any bead, [m], [m/s]."""
+    if is_dragged(state):
+        return flight_in_gas(state, i, now)
     if turns(state, i):
         place, velocity, _ = turned_bead(state, i, now)
         return place, velocity
@@ -79,10 +82,12 @@ def bead_at(state: State, i: int, now: float) -> tuple[Vector, Vector]:
 
 
 @inlined
-def straight_velocity(state: State, i: int) -> Vector:
+def straight_velocity(state: State, i: int, now: float) -> Vector:
     """Velocity of a bead, or of the centre of a body that turns, [m/s]."""
     if turns(state, i):
-        return motion_vector(state, body_of(state, i), VELOCITY)
+        return velocity_of_centre(state, body_of(state, i), now)
+    if is_dragged(state):
+        return flight_in_gas(state, i, now)[1]
     return state.rows[i, VX], state.rows[i, VY], state.rows[i, VZ]
 
 
@@ -95,18 +100,21 @@ def end_of_stretch(state: State, i: int) -> float:
 
 
 @inlined
-def largest_bend(state: State, i: int) -> float:
-    """Bound on the acceleration of a bead in the present stretch, [m/s^2]."""
+def largest_bend(state: State, i: int, now: float) -> float:
+    """Bound on the acceleration of a bead from a time on, in its stretch, [m/s^2]."""
+    bend = 0.0
     if turns(state, i):
-        return motion(state, body_of(state, i), MAX_BEND) * arm_length(state, i)
-    return 0.0
+        bend = motion(state, body_of(state, i), MAX_BEND) * arm_length(state, i)
+    if is_dragged(state):
+        bend += drag_rate(state, i) * length(straight_velocity(state, i, now))
+    return bend
 
 
 @inlined
-def largest_speed(state: State, i: int) -> float:
-    """Bound on the speed of a bead of a body that turns in the present stretch, [m/s]."""
+def largest_speed(state: State, i: int, now: float) -> float:
+    """Bound on the speed of a bead of a body that turns from a time on, in its stretch, [m/s]."""
     body = body_of(state, i)
-    speed = length(motion_vector(state, body, VELOCITY))
+    speed = length(velocity_of_centre(state, body, now))
     return speed + motion(state, body, MAX_SPIN) * arm_length(state, i)
 
 
@@ -115,14 +123,21 @@ def encounter(state: State, i: int, j: int, now: float) -> tuple[float, float]:
     """Times from now between which the spheres around the paths of two beads overlap, [s].
 
     A bead of a body that turns stays on a sphere around the centre of the body, which flies
-    straight. Infinite when they never do.
+    straight. Infinite when they never do. Where the gas slows both at different rates the first is
+    a bound below, and the second infinite.
     """
     place, arm = centre_of_bead(state, i, bead_at(state, i, now)[0], now)
     other, other_arm = centre_of_bead(state, j, bead_at(state, j, now)[0], now)
     d = difference(other, place)
-    u = difference(straight_velocity(state, j), straight_velocity(state, i))
+    velocity, other_velocity = straight_velocity(state, i, now), straight_velocity(state, j, now)
+    u = difference(other_velocity, velocity)
     reach = arm + other_arm + state.rows[i, RADIUS] + state.rows[j, RADIUS]
     reach *= 1.0 + _SLACK
+    if is_dragged(state) and drag_rate(state, i) != drag_rate(state, j):
+        gap, speed = length(d) - reach, length(velocity) + length(other_velocity)
+        if gap <= 0.0:
+            return 0.0, np.inf
+        return gap / speed if speed > 0.0 else np.inf, np.inf
     square = product(u, u)
     approach = product(d, u)
     gap_square = product(d, d) - reach * reach
@@ -135,7 +150,7 @@ def encounter(state: State, i: int, j: int, now: float) -> tuple[float, float]:
         return np.inf, np.inf
     root = math.sqrt(discriminant)
     first = 0.0 if gap_square <= 0.0 else gap_square / (root - approach)
-    return first, (root - approach) / square
+    return flight_time(state, i, first), flight_time(state, i, (root - approach) / square)
 
 
 @inlined
@@ -173,7 +188,7 @@ def wait_with_turning(
     if not first <= last:
         return np.inf
     reach = state.rows[i, RADIUS] + state.rows[j, RADIUS]
-    bend = largest_bend(state, i) + largest_bend(state, j)
+    bend = largest_bend(state, i, now) + largest_bend(state, j, now)
     wait = first
     for _ in range(MOST_STEPS):
         place, velocity = bead_at(state, i, now + wait)
@@ -207,7 +222,7 @@ def shell_exit_of_turning(state: State, i: int, now: float) -> float:
     """
     half = state.reach[HALF_SKIN]
     x, y, z = state.references[i, 0], state.references[i, 1], state.references[i, 2]
-    speed = largest_speed(state, i)
+    speed = largest_speed(state, i, now)
     time, end = now, end_of_stretch(state, i)
     if speed == 0.0:
         return end

@@ -6,6 +6,9 @@ time, see `rotation_series`. Where every bead is follows from it: the shape of a
 changes. Whether bodies turn is in the type of the state; where they do not, the compiler leaves
 this module out.
 
+With drag its velocity decays as that of a bead (`gas_drag`), and its angular momentum along its
+own axes is a power series as well.
+
 Tested by ``test/simulation/engine/flight/test_turning_motion.py``.
 """
 
@@ -17,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nanorocks_ros.numerics.compiled import inlined, kernel_where
+from nanorocks_ros.numerics.exponentials import decayed
+from nanorocks_ros.simulation.engine.flight.drag_rates import flown, is_dragged
 from nanorocks_ros.simulation.engine.gas_state import (
     BODY,
     FOLLOWING,
@@ -46,13 +51,18 @@ ORDER = 16
 # Columns of State.motions, in the row of the number of the body: the stretch of time; centre,
 # velocity and angular momentum (about the centre), the inverse tensor of inertia along the axes
 # of the body (xx, yy, zz, xy, xz, yz); bounds during the stretch on the angular velocity, and on
-# the acceleration of a bead per distance from the centre; the series, power by power.
+# the acceleration of a bead per distance from the centre; with drag the rate at which the velocity
+# decays, and the torque per angular velocity, a tensor like that of inertia; the series, power by
+# power.
 FROM, UNTIL = range(2)
 CENTRE, VELOCITY, MOMENT, INVERSE, MAX_SPIN, MAX_BEND = 2, 5, 8, 11, 17, 18
-SERIES = 19
+RATE, TORQUE = 19, 20
+SERIES = 26
 # In the row of a bead: where it is from the centre, along the axes of the body.
 ARM = SERIES + 4 * (ORDER + 1)
-COLUMNS = ARM + 3
+# With drag, the series of the angular momentum along the axes of the body.
+MOMENTS = ARM + 3
+COLUMNS = MOMENTS + 3 * (ORDER + 1)
 # Rows after those of the bodies, in which a series is computed.
 _SCRATCH_ROWS = 2
 
@@ -141,7 +151,13 @@ def conjugate(q: Quaternion) -> Quaternion:
 @inlined
 def times_inverse_inertia(state: State, body: int, v: Vector) -> Vector:
     """Inverse tensor of inertia times a vector, both along the axes of the body."""
-    first = COLUMNS * body + INVERSE
+    return times_tensor(state, body, INVERSE, v)
+
+
+@inlined
+def times_tensor(state: State, body: int, column: int, v: Vector) -> Vector:
+    """A symmetric tensor of a body times a vector, both along the axes of the body."""
+    first = COLUMNS * body + column
     j = state.motions.flat
     xx, yy, zz = j[first], j[first + 1], j[first + 2]
     xy, xz, yz = j[first + 3], j[first + 4], j[first + 5]
@@ -177,16 +193,62 @@ def orientation(state: State, body: int, now: float) -> Quaternion:
 
 
 @inlined
-def angular_velocity(state: State, body: int, q: Quaternion) -> Vector:
-    """Angular velocity of a body in an orientation, [rad/s]."""
-    moment = rotated(conjugate(q), motion_vector(state, body, MOMENT))
-    return rotated(q, times_inverse_inertia(state, body, moment))
+def velocity_of_centre(state: State, body: int, now: float) -> Vector:
+    """Velocity of the centre of mass of a body at a time of its stretch, [m/s]."""
+    velocity = motion_vector(state, body, VELOCITY)
+    if is_dragged(state):
+        since = now - motion(state, body, FROM)
+        return scaled(velocity, decayed(motion(state, body, RATE) * since)[1])
+    return velocity
+
+
+@inlined
+def own_moment(state: State, body: int, q: Quaternion, now: float) -> Vector:
+    """Angular momentum of a body along its own axes at a time of its stretch, [kg m^2/s].
+
+    Parameters
+    ----------
+    state : State
+    body : int
+    q : tuple of 4 floats
+        Its orientation.
+    now : float, [s]
+    """
+    if is_dragged(state):
+        since = now - motion(state, body, FROM)
+        first = COLUMNS * body + MOMENTS
+        series = state.motions.flat
+        x, y, z = 0.0, 0.0, 0.0
+        for power in range(ORDER, -1, -1):
+            k = first + 3 * power
+            x = x * since + series[k]
+            y = y * since + series[k + 1]
+            z = z * since + series[k + 2]
+        return x, y, z
+    return rotated(conjugate(q), motion_vector(state, body, MOMENT))
+
+
+@inlined
+def angular_velocity(state: State, body: int, q: Quaternion, now: float) -> Vector:
+    """Angular velocity of a body at a time of its stretch, [rad/s].
+
+    Parameters
+    ----------
+    state : State
+    body : int
+    q : tuple of 4 floats
+        Its orientation.
+    now : float, [s]
+    """
+    return rotated(q, times_inverse_inertia(state, body, own_moment(state, body, q, now)))
 
 
 @inlined
 def centre_at(state: State, body: int, now: float) -> Vector:
     """Centre of mass of a body at a time, [m]."""
     since = now - motion(state, body, FROM)
+    if is_dragged(state):
+        since = flown(motion(state, body, RATE), since)
     velocity = motion_vector(state, body, VELOCITY)
     return sum_of(motion_vector(state, body, CENTRE), scaled(velocity, since))
 
@@ -211,10 +273,10 @@ def turned_bead(state: State, i: int, now: float) -> tuple[Vector, Vector, Vecto
     """
     body = body_of(state, i)
     q = orientation(state, body, now)
-    spin = angular_velocity(state, body, q)
+    spin = angular_velocity(state, body, q, now)
     arm = rotated(q, motion_vector(state, i, ARM))
     place = sum_of(centre_at(state, body, now), arm)
-    velocity = sum_of(motion_vector(state, body, VELOCITY), cross(spin, arm))
+    velocity = sum_of(velocity_of_centre(state, body, now), cross(spin, arm))
     return place, velocity, spin
 
 

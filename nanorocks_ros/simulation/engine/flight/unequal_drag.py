@@ -17,7 +17,7 @@ import numpy as np
 
 from nanorocks_ros.numerics.compiled import compiled, inlined
 from nanorocks_ros.numerics.exponentials import decayed
-from nanorocks_ros.simulation.engine.flight.gas_drag import drag_rate
+from nanorocks_ros.simulation.engine.flight.drag_rates import drag_rate
 from nanorocks_ros.simulation.engine.flight.pair_times import is_rounding, minimum_image
 from nanorocks_ros.simulation.engine.gas_state import BODY, RADIUS
 from nanorocks_ros.simulation.engine.vectors import difference, product, scaled

@@ -85,3 +85,30 @@ def test_a_gas_of_bodies_that_break_keeps_its_books(kernel):
     assert total == pytest.approx(moment, abs=1e-10 * scale)
     assert np.abs(gas.ledger[15:18]).max() > 1e-3
     assert smallest_gap(record.positions, beads.radii, rules) > -1e-10
+
+
+def test_what_is_left_of_a_body_slows_at_rates_of_its_own(kernel):
+    """The chain slowed at the mean rate of its beads; then two of them, and the third alone."""
+    rates = np.array([0.01, 0.02, 0.06, 0.01])
+    gas = gas_of(
+        [(6, 10, 10), (8.1, 10, 10), (10.2, 10, 10), (10.1, 15, 10)],
+        [(0.1, 0, 0), (0, 0, 0), (-0.1, 0, 0), (0.0, -1.2, 0)],
+        sticking_speed=0.2,
+        break_up_speed=0.5,
+        box=(20, 20, 20),
+        drag=rates,
+        kernel=kernel,
+    )
+    gas.run_until(2.0)
+    assert gas.bodies.tolist() == [0, 0, 0, 3]
+    before, after = gas.follow(2.4, [2.0, 2.4]).velocities
+    left = np.exp(-0.4 * 0.03)
+    np.testing.assert_allclose(after[:3].sum(axis=0), left * before[:3].sum(axis=0), atol=1e-13)
+    gas.run_until(3.4)
+    assert gas.counts.break_up == 1
+    assert gas.bodies.tolist() == [0, 0, 2, 3]
+    first, later = gas.follow(3.6, [3.4, 3.6]).velocities
+    pair = np.exp(-0.2 * 0.015)
+    np.testing.assert_allclose(later[:2].sum(axis=0), pair * first[:2].sum(axis=0), atol=1e-13)
+    alone = np.exp(-0.2 * rates[2:])[:, np.newaxis]
+    np.testing.assert_allclose(later[2:], alone * first[2:], atol=1e-13)

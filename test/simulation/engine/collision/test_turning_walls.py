@@ -9,6 +9,7 @@ import pytest
 from gases import KERNELS, near
 from turning_bodies import MERGING, ROD, rod
 
+from nanorocks_ros.simulation.engine.gas_state import MOMENTUM
 from nanorocks_ros.simulation.engine.rules.wall_motion import WallMotion
 
 pytestmark = pytest.mark.parametrize('kernel', KERNELS)
@@ -106,3 +107,20 @@ def test_a_rod_that_rocks_between_close_walls_ends_no_run(kernel, restitution):
     energies = 0.5 * (record.velocities**2).sum(axis=(1, 2))
     energies += 0.5 * 0.4 * (record.spins**2).sum(axis=(1, 2))
     assert np.all(np.diff(energies) < 1e-12)
+
+
+def test_a_wall_takes_what_the_gas_has_left_of_the_momentum_of_a_body_that_sticks(kernel):
+    rate, velocity = 0.02, np.array([0.0, 0.4, 0.1])
+    gas = rod(
+        np.array([10.0, 9.0, 8.0]),
+        velocity,
+        (0.1, 0.0),
+        kernel=kernel,
+        wall_sticking_speed=1.0,
+        drag=np.full(2, rate),
+    )
+    events = gas.follow(80.0, log=True).events
+    assert list(events['kind']) == ['merge', 'fix']
+    left = 2.0 * velocity * np.exp(-rate * events['time'][1])
+    np.testing.assert_allclose(gas.ledger[MOMENTUM : MOMENTUM + 3], left, atol=1e-13)
+    assert gas.energy == 0.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gases import KERNELS, mixture
 from stepped_bodies import SteppedBodies
-from turning_bodies import MERGING, rod, spin_of_rod
+from turning_bodies import MERGING, ROD, rod, spin_of_rod
 
 from nanorocks_ros.simulation.engine import vectors
 from nanorocks_ros.simulation.engine.flight.turning_motion import FROM, UNTIL, rotated
@@ -72,6 +72,37 @@ def test_a_rod_turns_about_its_centre(kernel, across):
         speeds = velocity + sign * np.cross(spin, arm)
         np.testing.assert_allclose(record.velocities[:, bead], speeds, atol=1e-12)
         np.testing.assert_allclose(record.spins[:, bead], np.tile(spin, (31, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize('kernel', KERNELS)
+def test_a_gas_slows_a_rod_and_its_turning_until_it_rests(kernel):
+    """By the forces on both beads at their arms of length 1, and by the torques on their spins.
+
+    A bead that turns about its own centre slows 10/3 times as fast as one that moves, with the
+    moment of inertia 2/5.
+    """
+    rate, across = 0.2, (0.3, -0.1)
+    centre, velocity = np.array([10.0, 9.0, 8.0]), np.array([0.02, 0.05, -0.03])
+    gas = rod(centre, velocity, across, kernel=kernel, drag=np.full(2, rate))
+    gas.run_until(MERGING)
+    left_at_merge = math.exp(-rate * MERGING)
+    start = gas.follow(1.0, [1.0])
+    assert gas.counts.merge == 1
+    turning = rate * (2.0 * 1.0 + 2.0 * 10.0 / 3.0 * 0.4) / ROD
+    times = 1.0 + np.linspace(0.0, 30.0, 16)
+    record = gas.follow(times[-1], times)
+    since = (times - 1.0)[:, np.newaxis]
+    spun = np.exp(-turning * since) * start.spins[0, 0]
+    np.testing.assert_allclose(record.spins[:, 0], spun, atol=1e-13)
+    moved = record.velocities.mean(axis=1)
+    expected = np.exp(-rate * since) * moved[0]
+    np.testing.assert_allclose(moved, expected, atol=1e-14)
+    assert moved[0] == pytest.approx(velocity * left_at_merge * math.exp(-0.75 * rate), rel=0.05)
+    events = gas.follow(1e5, [1e5], log=True)
+    assert events.events.size == 0
+    assert not events.spins.any()
+    gone = record.positions[0].mean(axis=0) + moved[0] / rate
+    np.testing.assert_allclose(events.positions[0].mean(axis=0), gone, atol=1e-12)
 
 
 def test_a_body_of_any_shape_keeps_shape_energy_and_angular_momentum():
