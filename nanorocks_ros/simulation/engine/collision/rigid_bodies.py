@@ -98,14 +98,23 @@ def rotation_energy(state: State, i: int) -> float:
 
 
 @inlined
-def _set_inverse_inertia(state: State, i: int) -> None:
-    """Set the inverse tensor of inertia of a body from the arms of its beads."""
+def _tensor(state: State, i: int, per_rate: bool) -> tuple[Vector, Vector]:
+    """Tensor of inertia of a body along its axes, (xx, yy, zz) and (xy, xz, yz), [kg m^2].
+
+    With `per_rate` that of the torque of the gas per angular velocity, [kg m^2/s]: the forces on
+    the beads add up, as if they were far apart, and each has the torque of a bead that turns about
+    its own centre.
+    """
     xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     k = i
     while True:
         mass, radius = state.masses[k, OWN], state.rows[k, RADIUS]
+        spinning = INERTIA
+        if per_rate:
+            mass *= own_rate(state, k)
+            spinning *= TURNING_PER_MOVING
         x, y, z = motion_vector(state, k, ARM)
-        own = INERTIA * mass * radius * radius
+        own = spinning * mass * radius * radius
         xx += own + mass * (y * y + z * z)
         yy += own + mass * (x * x + z * z)
         zz += own + mass * (x * x + y * y)
@@ -115,6 +124,13 @@ def _set_inverse_inertia(state: State, i: int) -> None:
         k = as_int64(state.bodies[k, FOLLOWING])
         if k == i:
             break
+    return (xx, yy, zz), (xy, xz, yz)
+
+
+@inlined
+def _set_inverse_inertia(state: State, i: int) -> None:
+    """Set the inverse tensor of inertia of a body from the arms of its beads."""
+    (xx, yy, zz), (xy, xz, yz) = _tensor(state, i, False)
     a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     per = 1.0 / (xx * a + xy * b + xz * c)
     body = body_of(state, i)
@@ -127,30 +143,12 @@ def _set_inverse_inertia(state: State, i: int) -> None:
 
 @inlined
 def _set_drag(state: State, i: int) -> None:
-    """Set the rate of the velocity of a body, and its torque per angular velocity.
-
-    The forces on its beads add up, as if they were far apart, and each has the torque of a bead
-    that turns about its own centre.
-    """
-    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    k = i
-    while True:
-        per, radius = own_rate(state, k) * state.masses[k, OWN], state.rows[k, RADIUS]
-        x, y, z = motion_vector(state, k, ARM)
-        own = TURNING_PER_MOVING * INERTIA * per * radius * radius
-        xx += own + per * (y * y + z * z)
-        yy += own + per * (x * x + z * z)
-        zz += own + per * (x * x + y * y)
-        xy -= per * x * y
-        xz -= per * x * z
-        yz -= per * y * z
-        k = as_int64(state.bodies[k, FOLLOWING])
-        if k == i:
-            break
+    """Set the rate of the velocity of a body, and its torque per angular velocity."""
+    diagonal, other = _tensor(state, i, True)
     body = body_of(state, i)
     set_motion(state, body, RATE, drag_rate(state, i))
-    set_motion_vector(state, body, TORQUE, (xx, yy, zz))
-    set_motion_vector(state, body, TORQUE + 3, (xy, xz, yz))
+    set_motion_vector(state, body, TORQUE, diagonal)
+    set_motion_vector(state, body, TORQUE + 3, other)
 
 
 @inlined
